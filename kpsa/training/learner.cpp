@@ -20,7 +20,7 @@ TrainOptions OptionsOf(const Subspace& subspace, const TrainingRecord& record, s
   options.keep_modes = !subspace.kept_modes.values.empty();
   options.inner = subspace.of_inner() ? TrainOptions::Inner::kAlways : TrainOptions::Inner::kNever;
   for (const SubspaceOutput& output : subspace.outputs) options.stepped.push_back(output.stepped);
-  options.at_rest = record.at_rest;
+  options.at_rest = record.at_rest, options.may_leave_at_rest = false;
   if (record.mode == "paper") options.mode = EstimatorMode::kPaper;
   const TrainingRecord::Asked& asked = record.asked;
   options.samples = samples;

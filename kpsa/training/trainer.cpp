@@ -20,6 +20,7 @@ constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
 // Of a full frame: what a frame made as the clips are costs, with which controls that clips do not move are tried at rest;
 // and of that, what it costs then
 constexpr double kDearFollowing = 0.5, kCheaperAtRest = 0.75;
+constexpr const char* kNotLeft = "no second training that leaves controls at rest which this one gets wrong";
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
@@ -231,7 +232,12 @@ Result<Trained> TrainFollowing(const TrainingRig& rig, const std::vector<Trainin
   Result<Trained> all = TrainBest(rig, clips, options);
   if (!all.ok() || all->held.empty() || options.mode != EstimatorMode::kMap) return all;
   const bool dear = CostOfClips(*all) >= kDearFollowing * all->full_ns;
-  if ((!dear && all->untold.empty()) || limit.left() < 2 * all->seconds) return all;
+  if (!options.may_leave_at_rest || (!dear && all->untold.empty())) return all;
+  if (limit.left() < 2 * all->seconds) {
+    if (!all->untold.empty())
+      all->record.limited += all->record.limited.empty() ? kNotLeft : "; " + std::string(kNotLeft);
+    return all;
+  }
   TrainOptions rest = options;
   rest.seconds = limit.left();
   for (const std::size_t c : dear ? all->held : all->untold)

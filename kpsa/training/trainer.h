@@ -48,6 +48,8 @@ struct TrainOptions {
   std::vector<std::vector<Index>> stepped = {};
   // Controls that are left at rest, as people write their plugs, as a subspace has it that learns (TrainingRecord::at_rest).
   std::vector<std::string> at_rest = {};
+  // Others may be found that are better left at rest (TrainingRecord::at_rest), in a second training.
+  bool may_leave_at_rest = true;
   // About how long training may take: fewer poses, no cues of tiles, and a shorter calibration, where
   // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without
   // a limit.

@@ -122,5 +122,27 @@ TEST(PosesOfKind, HoldControlsFarOutOverClips) {
   EXPECT_TRUE(PosesOfKind(PoseKind::kHeld, controls, frames, {}, 0, 9, 7).empty()) << "no clips";
 }
 
+TEST(PosesAlone, HoldEachControlAtBothOfItsEnds) {
+  const std::vector<ControlRange> controls = Controls();
+  const std::vector<std::size_t> held{4, 7};
+  const auto poses = PosesAlone(controls, held, 8, 3, 7);
+  ASSERT_EQ(poses.size(), 16u);
+  std::multiset<double> ends;
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    EXPECT_TRUE(poses[p].clip >= 0 && poses[p].clip < 3);
+    for (std::size_t c = 0; c < controls.size(); ++c) {
+      const double value = poses[p].values[c];
+      if (c != held[p / 8]) {
+        EXPECT_EQ(value, 0);
+        continue;
+      }
+      EXPECT_GE(std::abs(value), 0.7 * (value > 0 ? controls[c].max : -controls[c].min));
+      if (value == controls[c].min || value == controls[c].max) ends.insert(value);
+    }
+  }
+  // Half of the poses are at an end; a weight has one
+  EXPECT_EQ(ends, (std::multiset<double>{-1, -1, 1, 1, 1, 1, 2, 2}));
+}
+
 }  // namespace
 }  // namespace kpsa::engine
