@@ -50,8 +50,10 @@ std::vector<SampledPose> TrainingSampler::Of(PoseKind kind, std::size_t count, s
                                              std::span<const double> margins) const {
   std::vector<ControlRange> controls = drawn_;
   for (std::size_t c = 0; c < margins.size(); ++c) controls[c].margin = margins[c];
-  std::vector<SampledPose> poses =
-      PosesOfKind(kind, controls, clip_poses_, groups_, clips_.size(), count, seed);
+  // Over the clips of the rig: what was learnt is a few frames about misses
+  const auto own = static_cast<std::size_t>(std::ranges::count(clips_, false, &TrainingClip::learnt));
+  std::vector<SampledPose> poses = PosesOfKind(kind, controls, clip_poses_, groups_,
+                                               kind == PoseKind::kHeld ? own : clips_.size(), count, seed);
   AddTilts(rig_.controls, drawn_.size(), seed, &poses);
   return poses;
 }
