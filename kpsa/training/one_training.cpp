@@ -68,7 +68,9 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
     if (mended.kind() == ErrorKind::kInterrupted) return mended;
   }
   Trained trained;
-  if (setup->of_map() && !setup->of_light() && setup->rig.some.empty()) {
+  const TrainOptions& options = setup->options;
+  if (setup->of_map() && !setup->of_light() && setup->rig.some.empty() && options.may_leave_at_rest &&
+      options.at_rest.empty()) {
     Result<std::vector<std::size_t>> untold = UntoldControls(setup, candidates.cues.set, subspace);
     if (!untold.ok()) return untold.status();
     trained.untold = std::move(*untold);
