@@ -9,15 +9,24 @@
 namespace kpsa::engine {
 namespace {
 
+// Where times lie between keys is told in single precision, in which the keys' times are (glTF 2.0, 3.11): frame 8 of 24
+// is a third of a second, which a file may have as 0.33333334. And an ulp later, as i * (1 / 24) comes out elsewhere.
+double ToLookUp(double seconds) {
+  constexpr double kUlp = 0x1p-23;
+  return static_cast<float>(seconds + kUlp * std::abs(seconds));
+}
+
 KeySpan SpanFrom(std::span<const float> times, std::size_t key, double seconds) {
   const double start = times[key], width = static_cast<double>(times[key + 1]) - start;
-  return {key, (seconds - start) / width, width};
+  return {key, std::max(0.0, (seconds - start) / width), width};
 }
 
 KeySpan Find(std::span<const float> times, double seconds) {
-  if (!(seconds > static_cast<double>(times.front()))) return {};  // NaN goes to the first key
-  if (seconds >= static_cast<double>(times.back())) return {times.size() - 1, 0, 0};
-  const auto next = std::upper_bound(times.begin(), times.end(), seconds,
+  const double first = times.front(), last = times.back();
+  if (!(seconds > first)) return {};  // NaN goes to the first key
+  const double looked_up = seconds < last ? ToLookUp(seconds) : last;
+  if (looked_up >= last) return {times.size() - 1, 0, 0};
+  const auto next = std::upper_bound(times.begin(), times.end(), looked_up,
                                      [](double s, float t) { return s < static_cast<double>(t); });
   return SpanFrom(times, static_cast<std::size_t>(next - times.begin()) - 1, seconds);
 }
@@ -86,20 +95,22 @@ KeyTimes::KeyTimes(std::vector<float> times) : times_(std::move(times)) {
 
 KeySpan KeyTimes::Find(double seconds) const {
   if (!(seconds > first_)) return {};
-  if (seconds >= last_) return {times_.size() - 1, 0, 0};
+  const double looked_up = seconds < last_ ? ToLookUp(seconds) : last_;
+  if (looked_up >= last_) return {times_.size() - 1, 0, 0};
   const auto at = [&](std::size_t key) { return static_cast<double>(times_[key]); };
-  const std::size_t guess = std::min(static_cast<std::size_t>((seconds - first_) * rate_), times_.size() - 2);
-  if (at(guess) <= seconds && seconds < at(guess + 1)) return SpanFrom(times_, guess, seconds);
-  // at(low) <= seconds < at(high); close in from the guess by doubling steps, then by halves
+  const std::size_t guess =
+      std::min(static_cast<std::size_t>((looked_up - first_) * rate_), times_.size() - 2);
+  if (at(guess) <= looked_up && looked_up < at(guess + 1)) return SpanFrom(times_, guess, seconds);
+  // at(low) <= looked_up < at(high); close in from the guess by doubling steps, then by halves
   std::size_t low = 0, high = times_.size() - 1;
   for (std::size_t from = guess, step = 1; from > low && from < high; step *= 2) {
-    const bool below = at(from) <= seconds;
+    const bool below = at(from) <= looked_up;
     (below ? low : high) = from;
     from = below ? from + step : from - std::min(step, from);
   }
   while (high - low > 1) {
     const std::size_t middle = (low + high) / 2;
-    (at(middle) <= seconds ? low : high) = middle;
+    (at(middle) <= looked_up ? low : high) = middle;
   }
   return SpanFrom(times_, low, seconds);
 }

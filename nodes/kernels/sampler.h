@@ -25,7 +25,8 @@ struct SamplerKeys {
 };
 
 // Between which keys a time lies: value = key `key` at t = 0 to key `key + 1` at t = 1, `width` seconds
-// apart. At and beyond the ends, and for NaN, t is 0.
+// apart. At and beyond the ends, and for NaN, t is 0. A key counts as reached up to two ulps (of single
+// precision) before its time.
 struct KeySpan {
   std::size_t key = 0;
   double t = 0, width = 0;

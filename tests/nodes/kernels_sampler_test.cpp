@@ -29,6 +29,36 @@ TEST(Sampler, StepHoldsAndLinearGoesStraight) {
   EXPECT_EQ(SampleVec3(keys, 3.999), (Double3{1, 2, 3}));
 }
 
+// A third of a second is 0.33333334 in single precision: frame 8 of 24 is that key, and not the one before.
+TEST(Sampler, FramesMeetTheKeysThatWereExportedOfThem) {
+  for (const double fps : {12.0, 23.976, 24.0, 25.0, 30.0, 60.0, 100.0}) {
+    std::vector<float> rounded, multiplied, values;
+    std::size_t later = 0;
+    for (int frame = 0; frame < 3000; ++frame) {
+      rounded.push_back(static_cast<float>(frame / fps));
+      multiplied.push_back(static_cast<float>(frame) * static_cast<float>(1 / fps));
+      values.push_back(static_cast<float>(frame));
+      later += rounded.back() > frame / fps;
+    }
+    EXPECT_TRUE(later > 100 || fps == 25 || fps == 100) << "some keys are later than their frames";
+    for (const std::vector<float>& times : {rounded, multiplied}) {
+      const SamplerKeys keys{times, values, 1, Interpolation::kStep};
+      ASSERT_TRUE(keys.Validate().ok());
+      const KeyTimes shared(times);
+      for (int frame = 0; frame < 3000; ++frame) {
+        double value = -1;
+        SampleScalars(keys, frame / fps, {&value, 1});
+        ASSERT_EQ(value, frame) << fps;
+        const KeySpan span = shared.Find(frame / fps);
+        ASSERT_EQ(span.key, static_cast<std::size_t>(frame)) << fps;
+        ASSERT_TRUE(span.t >= 0 && span.t < 1e-3) << fps;
+        SampleScalars(keys, (frame - 1e-3) / fps, {&value, 1});
+        ASSERT_EQ(value, std::max(0, frame - 1)) << "and no earlier";
+      }
+    }
+  }
+}
+
 TEST(Sampler, CubicFollowsTheHermiteFormula) {
   // A cubic polynomial with its own derivatives as tangents is reproduced between the keys
   const auto f = [](double t) { return 0.5 * t * t * t - 2 * t * t + t + 3; };
@@ -87,8 +117,10 @@ TEST(Sampler, KeysAreFoundHoweverTheyAreSpaced) {
       for (int i = 0; i < 2000; ++i) {
         double at = times.front() - 1 + random.Unit() * (times.back() - times.front() + 2);
         if (i % 3 == 0) at = times[static_cast<std::size_t>(i) % times.size()];  // a key itself
-        if (i % 3 == 1)
-          at = std::nextafter(static_cast<double>(times[static_cast<std::size_t>(i) % times.size()]), -1e9);
+        if (i % 3 == 1) {  // before it, by more than keys count as reached
+          const auto key = static_cast<double>(times[static_cast<std::size_t>(i) % times.size()]);
+          at = key - 4 * 0x1p-23 * std::abs(key);
+        }
         const KeySpan span = keys.Find(at);
         const auto next = std::upper_bound(times.begin(), times.end(), at,
                                            [](double a, float b) { return a < static_cast<double>(b); });
