@@ -10,6 +10,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr double kLeastDeterminant = 1e-9;  // of a matrix that is inverted
+constexpr double kAlmostRotation = 4;       // axes of so many times the length, or one so many times shorter
 
 }  // namespace
 
@@ -22,6 +23,13 @@ Affine RelativeMatrix(const PoseLayout& layout, std::span<const float> row, cons
                        (mean == nullptr ? 0 : (*mean)[static_cast<Eigen::Index>(first + e)]);
   }
   return matrix;
+}
+
+double JointScale(const PoseLayout& layout, const Eigen::VectorXd& mean, Index first_entry) {
+  const auto first = static_cast<Eigen::Index>(layout.scalar_begin() + first_entry);
+  const double length = std::sqrt(mean.segment(first, 9).squaredNorm() / 3);
+  if (!(length > 0) || (length < kAlmostRotation && length > 1 / kAlmostRotation)) return 1;
+  return std::exp2(std::round(std::log2(length)));
 }
 
 std::optional<Affine> InverseOf(const Affine& matrix) {
@@ -84,6 +92,8 @@ CueSet MeasureCues(const PoseMatrix& poses, const Eigen::VectorXd& mean, std::sp
     const auto row = static_cast<Eigen::Index>(set.offsets[k]);
     const double variance = measured->row(row).squaredNorm() / static_cast<double>(poses.poses());
     if (cues[k].kind == CueKind::kScalar && variance > 0) set.scale[row] = 1 / std::sqrt(variance);
+    if (cues[k].kind != CueKind::kScalar && cues[k].joint != kNoIndex)
+      set.scale.segment(row, 3).setConstant(JointScale(layout, mean, cues[k].joint));
   }
   *measured = set.scale.asDiagonal() * *measured;
   return set;

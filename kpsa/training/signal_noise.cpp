@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kpsa/training/cue_values.h"
 #include "kpsa/training/pose_recorder.h"
 
 namespace kpsa::engine {
@@ -14,8 +15,8 @@ constexpr double kFactorShift = 0.2;                       // tolerances: and of
 
 }  // namespace
 
-CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, double diagonal, double tolerance,
-                 bool of_light) {
+CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, const Eigen::VectorXd& mean,
+                 double diagonal, double tolerance, bool of_light) {
   CueNoise noise(diagonal);
   const double shift = kNoiseShare * tolerance;
   noise.point = std::max(noise.point, shift * shift);
@@ -23,8 +24,9 @@ CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, doub
   const std::vector<Index> first = FirstScalars(signals, layout);
   for (std::size_t s = 0; s < signals.size(); ++s) {
     if (!signals[s].matrix) continue;
+    const double scale = signals[s].relative ? JointScale(layout, mean, first[s]) : 1;
     for (Index e = 0; e < signals[s].entries(); ++e) {
-      const double still = e < 9 ? kNoiseTurn : of_light ? kLightShift : shift;
+      const double still = e < 9 ? scale * kNoiseTurn : of_light ? kLightShift : shift;
       noise.scalars[first[s] + e] = still * still;
     }
   }

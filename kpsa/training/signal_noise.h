@@ -12,9 +12,9 @@ namespace kpsa::engine {
 
 inline constexpr double kLightShift = 1e-4;  // of light: metres that no one would see a joint move
 
-// diagonal: of the model; tolerance: scene units, as the diagonal.
-CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, double diagonal, double tolerance,
-                 bool of_light);
+// mean: of the poses' columns; diagonal: of the model; tolerance: scene units, as the diagonal.
+CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, const Eigen::VectorXd& mean,
+                 double diagonal, double tolerance, bool of_light);
 // Every value is a regressor; of the matrices, only local ones have factors.
 CueProductOptions ProductOptionsOf(std::span<const Signal> signals, const PoseLayout& layout,
                                    double tolerance);

@@ -83,11 +83,12 @@ void WriteProducts(const std::vector<TileFactors>& factors, const std::vector<Ti
 }
 
 // The joints in whose spaces tiles lie, each once; nothing where there are none.
-void WriteJoints(const std::vector<std::vector<std::uint32_t>>& rows_of_tile, const TileInputs& inputs,
-                 TileData* data) {
+void WriteJoints(const std::vector<std::vector<std::uint32_t>>& rows_of_tile,
+                 const std::vector<double>& scale_of_tile, const TileInputs& inputs, TileData* data) {
   std::map<std::vector<std::uint32_t>, std::uint32_t> number;
   std::vector<std::uint32_t> joints;
-  for (const std::vector<std::uint32_t>& rows : rows_of_tile) {
+  for (std::size_t t = 0; t < rows_of_tile.size(); ++t) {
+    const std::vector<std::uint32_t>& rows = rows_of_tile[t];
     if (rows.empty()) {
       joints.push_back(0);
       continue;
@@ -96,10 +97,11 @@ void WriteJoints(const std::vector<std::vector<std::uint32_t>>& rows_of_tile, co
     const auto [found, is_new] = number.emplace(rows, static_cast<std::uint32_t>(number.size() + 1));
     joints.push_back(found->second);
     if (!is_new) continue;
-    for (const std::uint32_t row : rows) {
-      data->joint_rows.push_back(row);
-      data->joint_mean.push_back(inputs.row_mean[row]);
-      data->joint_deviation.push_back(1 / inputs.row_scale[row]);
+    for (std::size_t e = 0; e < rows.size(); ++e) {
+      const double scale = e < 9 ? scale_of_tile[t] : 1;
+      data->joint_rows.push_back(rows[e]);
+      data->joint_mean.push_back(inputs.row_mean[rows[e]] / scale);
+      data->joint_deviation.push_back(1 / inputs.row_scale[rows[e]] / scale);
     }
   }
   if (!number.empty()) data->joints = std::move(joints);
@@ -173,6 +175,7 @@ struct TileBuilder::Made {
   std::vector<TileFactors> factors;
   std::vector<TileProducts> products;
   std::vector<std::vector<std::uint32_t>> joint_rows;
+  std::vector<double> joint_scales;
   std::vector<Eigen::VectorXd> means;
 };
 
@@ -186,6 +189,7 @@ void TileBuilder::Add(std::size_t tiles, const std::function<TileModel(std::size
   made_->factors.resize(first + tiles);
   made_->products.resize(first + tiles);
   made_->joint_rows.resize(first + tiles);
+  made_->joint_scales.resize(first + tiles);
   made_->means.resize(first + tiles);
   ParallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
@@ -194,6 +198,7 @@ void TileBuilder::Add(std::size_t tiles, const std::function<TileModel(std::size
       TileFactors& factors = made_->factors[first + t];
       factors = FactorModel(model, inputs.samples, components_, own, true);
       made_->joint_rows[first + t] = model.joint_rows;
+      made_->joint_scales[first + t] = model.joint_scale;
       made_->means[first + t] = model.mean;
       if (inputs.poses == nullptr || components_ != 3 || factors.columns.empty()) continue;
       TileFactors factored =
@@ -277,7 +282,7 @@ TileMap TileBuilder::Finish(const Eigen::VectorXd& mean, const TileInputs& input
     u = WriteColumns(f, c, panels(t), u);
   }
   WriteProducts(factors, made_->products, &data);
-  WriteJoints(made_->joint_rows, inputs, &data);
+  WriteJoints(made_->joint_rows, made_->joint_scales, inputs, &data);
   if (report != nullptr) *report = found;
   Result<TileMap> map = TileMap::Make(std::move(data), "tiles");
   KPSA_CHECK(map.ok());

@@ -56,7 +56,7 @@ std::vector<std::size_t> EveryPose(const PoseMatrix& poses, std::size_t stride) 
   return rows;
 }
 
-// Some poses as they are seen from a joint (kNoIndex: from the space). Rows are centred, and in
+// Some poses as they are seen from a joint (kNoIndex: from the space), but for what it scales. Rows are centred, and in
 // scene units. Without poses where the joint's matrix has no inverse.
 class View {
  public:
@@ -66,6 +66,7 @@ class View {
       std::optional<Affine> back = Affine(Affine::Identity());
       if (joint != kNoIndex)
         back = InverseOf(RelativeMatrix(poses.layout(), poses.row(t), options.mean, joint));
+      if (back && joint != kNoIndex) *back *= JointScale(poses.layout(), *options.mean, joint);
       if (!back) {
         back_.clear();
         break;
@@ -110,13 +111,13 @@ class View {
         const Index entry = (cue.index - layout.relative_begin) % 12;
         while (last < cues.size() && cues[last].index == cue.index + (last - k) && entry + (last - k) < 12)
           ++last;
+        const double turn = options_.turn_reach / JointScale(layout, *options_.mean, cue.index - entry);
         for (Eigen::Index t = 0; t < poses(); ++t) {
           const Affine matrix = Product(back_[static_cast<std::size_t>(t)],
                                         RelativeMatrix(layout, RowOf(t), options_.mean, cue.index - entry));
           for (std::size_t i = k; i < last; ++i) {
             const std::size_t e = entry + (i - k);
-            rows(row + static_cast<Eigen::Index>(i - k), t) =
-                (e < 9 ? options_.turn_reach : 1) * matrix.data()[e];
+            rows(row + static_cast<Eigen::Index>(i - k), t) = (e < 9 ? turn : 1) * matrix.data()[e];
           }
         }
         row += static_cast<Eigen::Index>(last - k);
@@ -470,10 +471,13 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
     const auto cue =
         static_cast<std::size_t>(std::ranges::upper_bound(set.offsets, row) - set.offsets.begin() - 1);
     const CueRef& of = set.cues[cue];
-    const bool is_length =
-        of.kind != CueKind::kScalar ||
-        (of.index >= poses.layout().relative_begin && (of.index - poses.layout().relative_begin) % 12 >= 9);
-    unit[i] = (is_length ? 1 : options.turn_reach) / set.scale[row];
+    const PoseLayout& layout = poses.layout();
+    const bool of_matrix = of.kind == CueKind::kScalar && of.index >= layout.relative_begin;
+    const Index entry = of_matrix ? (of.index - layout.relative_begin) % 12 : 0;
+    double reach = of.kind != CueKind::kScalar || (of_matrix && entry >= 9) ? 1 : options.turn_reach;
+    if (of_matrix && entry < 9) reach /= JointScale(layout, *options.mean, of.index - entry);
+    if (of.joint != kNoIndex) reach *= JointScale(layout, *options.mean, of.joint);
+    unit[i] = reach / set.scale[row];
   }
   const View view(poses, options, joint, EveryPose(poses, 1));
   const Eigen::Index count = measured.cols();

@@ -101,8 +101,8 @@ Status FindModes(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes
   modes->still = !setup.of_light() && setup.options.mode == EstimatorMode::kMap &&
                  IsStill(modes->pca, setup.options.tolerance);
   if (modes->still) modes->pca = TruncatedPca(modes->pca, 1);
-  modes->noise = NoiseOf(setup.recorder->signals(), setup.layout, modes->diagonal, setup.options.tolerance,
-                         setup.of_light());
+  modes->noise = NoiseOf(setup.recorder->signals(), setup.layout, mean, modes->diagonal,
+                         setup.options.tolerance, setup.of_light());
   record->diagonal = modes->diagonal;
   record->motion_rms =
       std::sqrt(modes->pca.total_energy / static_cast<double>(poses->poses.poses() * setup.layout.points));

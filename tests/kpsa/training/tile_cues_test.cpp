@@ -29,8 +29,8 @@ PoseLayout LimbLayout() {
 }
 
 // A limb along x, bent at 0.5; the flesh about the bend bulges with the square of the angle, and a weight
-// makes the upper half thicker.
-PoseMatrix LimbPoses(std::size_t count, unsigned seed) {
+// makes the upper half thicker. scale: of the joints, as of an armature in other units.
+PoseMatrix LimbPoses(std::size_t count, unsigned seed, double scale = 1) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(-1, 1);
   PoseMatrix poses(LimbLayout());
@@ -56,15 +56,15 @@ PoseMatrix LimbPoses(std::size_t count, unsigned seed) {
     const std::span<float> scalars = row.subspan(poses.layout().scalar_begin());
     scalars[0] = static_cast<float>(weight);
     for (std::size_t e = 0; e < 12; ++e) {
-      scalars[kUpperEntry + e] = static_cast<float>(upper.data()[e]);
-      scalars[kLowerEntry + e] = static_cast<float>(lower.data()[e]);
+      scalars[kUpperEntry + e] = static_cast<float>((e < 9 ? scale : 1) * upper.data()[e]);
+      scalars[kLowerEntry + e] = static_cast<float>((e < 9 ? scale : 1) * lower.data()[e]);
     }
   }
   return poses;
 }
 
 struct Limb {
-  explicit Limb(bool joints) : poses(LimbPoses(1200, 1)) {
+  explicit Limb(bool joints, double scale = 1) : poses(LimbPoses(1200, 1, scale)) {
     mean = poses.Mean();
     poses.Subtract(mean);
     std::vector<TileCandidates> tiles(2);
@@ -134,6 +134,26 @@ TEST(TileCues, ALimbIsToldInTheSpaceOfItsJoint) {
     const Index begin = limb.made.cues.offsets[k], end = limb.made.cues.offsets[k + 1];
     EXPECT_TRUE(std::any_of(read.begin() + begin, read.begin() + end, [](char r) { return r != 0; })) << k;
   }
+}
+
+TEST(TileCues, JointsOfAnyScaleTellAsMuch) {
+  const double error = Limb(true).LargestError(LimbPoses(200, 2));
+  for (const double scale : {1.0 / 128, 0.01, 100.0, 128.0}) {
+    const Limb limb(true, scale);
+    for (const Index joint : limb.chosen.joint)
+      EXPECT_TRUE(joint == kUpperEntry || joint == kLowerEntry) << joint;
+    const bool of_two = std::exp2(std::round(std::log2(scale))) == scale;
+    EXPECT_LT(limb.LargestError(LimbPoses(200, 2, scale)), of_two ? 1.01 * error : 0.3 * kLimbTolerance)
+        << scale;
+  }
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(LimbLayout().columns()));
+  const auto first = static_cast<Eigen::Index>(LimbLayout().scalar_begin() + kUpperEntry);
+  for (const double length : {0.3, 1.0, 3.0}) {
+    mean[first] = mean[first + 4] = mean[first + 8] = length;
+    EXPECT_EQ(JointScale(LimbLayout(), mean, kUpperEntry), 1) << length;
+  }
+  mean.segment(first, 9) *= 100.0 / 3;
+  EXPECT_EQ(JointScale(LimbLayout(), mean, kUpperEntry), 128);
 }
 
 // Before any tile is stored: what is beyond even then is the least that they miss.
