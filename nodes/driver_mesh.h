@@ -11,6 +11,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/moving_surface.h"
 #include "nodes/kernels/topology.h"
+#include "nodes/known_influences.h"
 
 namespace kpsa::engine {
 
@@ -26,6 +27,8 @@ struct DriverRest {
   std::vector<Double3> points;
   TriangleTree tree;
   std::optional<MovingSurface> moving;
+  std::shared_ptr<KnownInfluences> influences =
+      std::make_shared<KnownInfluences>();  // of what wraps itself around it
 };
 
 struct Driver {

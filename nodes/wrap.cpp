@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "base/digest.h"
 #include "graph/geometry.h"
 #include "nodes/driver_mesh.h"
 #include "nodes/kernels/carried_delta.h"
@@ -29,6 +30,27 @@ WrapMode ModeOf(const Structural& s) {
   }
 }
 
+// Those that have a weight.
+std::vector<Index> WithWeight(const std::vector<Index>& points, std::span<const float> weights) {
+  if (weights.empty()) return points;
+  std::vector<Index> moved;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (weights[i] != 0) moved.push_back(points[i]);
+  }
+  return moved;
+}
+// Of all points, from those of the ones that have a weight.
+WrapInfluences OfAll(WrapInfluences of_moved, std::span<const float> weights) {
+  std::vector<Index> offsets = {0};
+  std::size_t moved = 0;
+  for (const float weight : weights) {
+    moved += weight != 0 ? 1 : 0;
+    offsets.push_back(of_moved.offsets[moved]);
+  }
+  of_moved.offsets = std::move(offsets);
+  return of_moved;
+}
+
 template <bool kAmongPoints>
 WrapInfluences FindInfluences(const Structural& s, const Driver& driver, const PointSet& out,
                               ConstPointsView rest, std::span<const float> weights) {
@@ -38,13 +60,23 @@ WrapInfluences FindInfluences(const Structural& s, const Driver& driver, const P
   const double scale = frame.ok() ? frame->WorldScale() : 1;
   const double asked = s.get_double("maxDistance") / scale;
   const double distance = asked > 0 ? asked : std::numeric_limits<double>::infinity();
-  if constexpr (kAmongPoints) {
-    return NearestInfluences(surface, rest, out.ToVector(), distance,
-                             static_cast<std::size_t>(s.get_int("influences")), weights);
-  } else {
-    return SurfaceInfluences(surface, *driver.topology, rest, out.ToVector(), distance,
-                             s.get_int("smoothInfluences"), weights);
-  }
+  const auto rings = static_cast<int>(s.get_int(kAmongPoints ? "influences" : "smoothInfluences"));
+  Hasher hasher;
+  hasher.Add(kAmongPoints);
+  hasher.Add(distance);
+  hasher.Add(rings);
+  for (const float* row : {rest.x, rest.y, rest.z}) hasher.AddLong(std::span<const float>(row, rest.count));
+  const auto find = [&](std::span<const Index> points) {
+    if constexpr (kAmongPoints) {
+      return NearestInfluences(surface, rest, points, distance, static_cast<std::size_t>(rings));
+    } else {
+      return SurfaceInfluences(surface, *driver.topology, rest, points, distance, rings);
+    }
+  };
+  const std::vector<Index> points = out.ToVector();
+  WrapInfluences influences =
+      driver.rest->influences->Of(hasher.Finish(), rest.count, WithWeight(points, weights), find);
+  return weights.empty() ? influences : OfAll(std::move(influences), weights);
 }
 
 template <bool kAmongPoints>

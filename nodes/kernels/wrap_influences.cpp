@@ -102,9 +102,12 @@ std::vector<Index> PointTriangles(const Topology& topology) {
 
 std::vector<Index> WrapDemand(const Topology& driver, std::span<const Double3> driver_rest,
                               const WrapInfluences& influences, WrapMode mode) {
-  std::vector<Index> points = influences.points;
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
+  std::vector<char> asked(driver.point_count(), 0);
+  for (const Index point : influences.points) asked[point] = 1;
+  std::vector<Index> points;
+  for (Index point = 0; point < asked.size(); ++point) {
+    if (asked[point] != 0) points.push_back(point);
+  }
   if (mode == WrapMode::kSnap) return points;
   const std::vector<Index> rings = DriverFramesDemand(driver, driver_rest, points);
   std::vector<Index> all;
