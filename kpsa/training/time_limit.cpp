@@ -46,12 +46,11 @@ void KeepSpread(std::size_t count, PoseMatrix* poses, std::size_t* of_clips) {
   *of_clips = clips;
 }
 
-bool FitIntoTime(PoseMatrix* poses, std::size_t* of_clips, TimeLimit* limit) {
-  const std::size_t all = poses->poses(), within = PosesWithin(limit->left(), *poses);
-  if (within >= all) return false;
-  KeepSpread(within, poses, of_clips);
-  limit->LeaveOut(fmt::format("{} of {} poses", within, all));
-  return true;
+bool FitIntoTime(PoseMatrix* poses, std::size_t* of_clips, std::size_t not_recorded, TimeLimit* limit) {
+  const std::size_t all = poses->poses(), within = std::min(all, PosesWithin(limit->left(), *poses));
+  if (within < all) KeepSpread(within, poses, of_clips);
+  if (within < all + not_recorded) limit->LeaveOut(fmt::format("{} of {} poses", within, all + not_recorded));
+  return within < all;
 }
 
 std::optional<PoseMatrix> SpareForModes(PoseMatrix* poses, std::size_t* of_clips, double most_work) {

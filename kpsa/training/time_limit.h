@@ -33,8 +33,9 @@ std::size_t PosesWithin(double seconds, const PoseMatrix& poses);
 // Leaves `count` of the poses, spread evenly; of_clips: how many of them, first, are of clips.
 void KeepSpread(std::size_t count, PoseMatrix* poses, std::size_t* of_clips);
 
-// Leaves as many of the poses as there is time for, as these two say; false where all fit.
-bool FitIntoTime(PoseMatrix* poses, std::size_t* of_clips, TimeLimit* limit);
+// Leaves as many of the poses as there is time for, as these two say, and tells so, of these and of others that were not
+// even recorded; false where all fit.
+bool FitIntoTime(PoseMatrix* poses, std::size_t* of_clips, std::size_t not_recorded, TimeLimit* limit);
 
 // Modes take the square of the poses, times their columns. Where that would be most of the time of a
 // training, every fourth pose is taken out, for what grows with their number alone; of_clips as above.

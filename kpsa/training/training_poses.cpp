@@ -1,6 +1,8 @@
 #include "kpsa/training/training_poses.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "kpsa/training/cue_products.h"
 #include "kpsa/training/miss_samples.h"
@@ -11,6 +13,16 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kBetween = 400;  // poses between the frames of all clips, at most
+constexpr double kToSample =
+    0.25;  // of the time that is left, where there is a limit: samples take no more of it,
+constexpr std::size_t kLeastSampled = 250;  // but these are drawn in any case
+
+// How many there is time for, after so many poses of clips.
+std::size_t SamplesWithin(const TimeLimit& limit, double seconds, std::size_t poses) {
+  if (!std::isfinite(limit.left()) || poses == 0) return std::numeric_limits<std::size_t>::max();
+  const double within = kToSample * limit.left() * static_cast<double>(poses) / std::max(seconds, 1e-9);
+  return std::max(kLeastSampled, static_cast<std::size_t>(std::clamp(within, 0.0, 1e9)));
+}
 
 }  // namespace
 
@@ -44,9 +56,12 @@ Status RecordPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* reco
   }
   KPSA_RETURN_IF_ERROR(setup->sampler->LearnHowControlsMove());
   if (setup->options.by_tile_as_before) KPSA_RETURN_IF_ERROR(setup->trained_sampler->LearnHowControlsMove());
-  const Result<std::size_t> sampled = setup->trained_sampler->AddTraining(&to->poses);
+  const std::size_t wanted = setup->options.samples,
+                    most = SamplesWithin(setup->limit, setup->limit.elapsed() - before, to->poses.poses());
+  const Result<std::size_t> sampled = setup->trained_sampler->AddTraining(most, &to->poses);
   if (!sampled.ok()) return sampled.status();
-  if (*sampled < setup->options.samples)
+  to->not_sampled = wanted - std::min(wanted, most);
+  if (*sampled < std::min(wanted, most))
     setup->limit.LeaveOut(fmt::format("{} of {} samples, as more would take too much memory", *sampled,
                                       setup->options.samples));
   record->sampled_poses = to->poses.poses() - record->clip_poses;
@@ -64,7 +79,7 @@ Status RecordPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* reco
 }
 
 void FitPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* record) {
-  if (!setup->of_light() && FitIntoTime(&to->poses, &record->clip_poses, &setup->limit))
+  if (!setup->of_light() && FitIntoTime(&to->poses, &record->clip_poses, to->not_sampled, &setup->limit))
     record->sampled_poses = to->poses.poses() - record->clip_poses;
 }
 

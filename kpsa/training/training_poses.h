@@ -21,6 +21,7 @@ struct TrainingPoses {
   std::optional<PoseMatrix> spare;  // not for modes
   std::size_t clip_poses = 0;       // of those for modes, the first ones
   double pose_seconds = 0;          // that recording one takes
+  std::size_t not_sampled = 0;      // for want of time
 };
 
 // Evaluates them. Reads the setup and draws with its samplers; writes which there are to the record. Errors: too few

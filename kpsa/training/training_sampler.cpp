@@ -71,9 +71,9 @@ std::vector<SampledPose> TrainingSampler::SweepsWithTilts() const {
   return sweeps;
 }
 
-Result<std::size_t> TrainingSampler::AddTraining(PoseMatrix* poses) const {
+Result<std::size_t> TrainingSampler::AddTraining(std::size_t most, PoseMatrix* poses) const {
   if (options_.samples > 0) KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
-  const std::size_t count = std::min(options_.samples, std::max(RoomBeside(*poses), kLeastSamples));
+  const std::size_t count = std::min({options_.samples, most, std::max(RoomBeside(*poses), kLeastSamples)});
   KPSA_RETURN_IF_ERROR(AddSampled(count, options_.seed, poses));
   return count;
 }

@@ -34,8 +34,8 @@ class TrainingSampler {
   std::vector<SampledPose> SweepsWithTilts() const;  // each control alone
 
   // Sweeps, and as many samples as the options want and memory holds: the sampler's kind, and some of the
-  // others. Light: no others. How many samples were drawn.
-  Result<std::size_t> AddTraining(PoseMatrix* poses) const;
+  // others, but no more than `most`. Light: no others. How many samples were drawn.
+  Result<std::size_t> AddTraining(std::size_t most, PoseMatrix* poses) const;
   // More samples, of another seed, as far as there is room beside the poses; and PosesTogether, for tiles with
   // cues of their own.
   Status AddMore(const PoseMatrix& beside, PoseMatrix* poses) const;
