@@ -83,7 +83,8 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
       RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   if (r.speedup() < 1)
     text += fmt::format("           slower than the full evaluation: {}\n",
-                        r.hits > 0 && r.speedup_on_hits() >= 1
+                        r.hits == 0 ? "no frame hits, and frames that miss are judged besides"
+                        : r.speedup_on_hits() >= 1
                             ? "frames that miss cost it once more, and too few hit"
                             : "even frames that hit cost more; evaluate these without the subspace");
   text += fmt::format("hits       {:.1f} % of frames: {}\n", 100 * static_cast<double>(r.hits) / frames,
@@ -119,6 +120,12 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
   if (!r.tolerances.rows.empty()) text += "\n" + ToleranceText(r.tolerances, BenchWords(r));
   return text + ReferenceText(r);
+}
+
+// Whether so many frames of clips miss that a subspace should learn from them.
+bool MayLearn(const BenchResult& r) {
+  const bool of_clips = !r.clips.empty() && r.clips.front() != "(rest)";
+  return of_clips && !r.light && r.promise.tolerance > 0 && 2 * r.hits < r.frames;
 }
 
 }  // namespace
@@ -159,6 +166,11 @@ std::string BenchText(const std::vector<BenchResult>& results, const BenchContex
   std::string text;
   for (const BenchResult& result : results) text += (text.empty() ? "" : "\n\n") + SideText(result, context);
   const std::string with = context.kpsa.empty() ? "--accelerate" : "--kpsa " + context.kpsa.front();
+  if (results.size() == 1 && MayLearn(results.front()))
+    return text +
+           fmt::format(
+               "\nnext: kpsa learn {}{} --clips {} --force, which trains again, with what misses here\n",
+               context.rig, context.kpsa.empty() ? "" : " " + with, fmt::join(results.front().clips, ","));
   return text + fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
 }
 

@@ -34,5 +34,29 @@ TEST(BenchReport, TheSpeedupHasASpread) {
       << BenchText({result}, context);
 }
 
+TEST(BenchReport, SaysWhySlowerAndWhatToDoWhereFramesMiss) {
+  BenchResult result;
+  result.full_ms = 1, result.accelerated_ms = 1.2, result.frames = 10, result.promise.tolerance = 0.01;
+  result.clips = {"walk", "run"};
+  BenchContext context;
+  context.rig = "man.yaml";
+  const auto has = [&](const char* words) {
+    const std::string text = BenchText({result}, context);
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+  };
+  has("slower than the full evaluation: no frame hits, and frames that miss are judged besides\n");
+  has("next: kpsa learn man.yaml --clips walk,run --force, which trains again");
+  context.kpsa = {"old.kpsa"};
+  has("next: kpsa learn man.yaml --kpsa old.kpsa --clips walk,run --force");
+  result.clips = {"(rest)"};
+  has("next: kpsa eval man.yaml --kpsa old.kpsa -o fast.npz");
+  result.clips = {"walk"}, result.hits = 5;
+  has("next: kpsa eval");
+  result.full_ms_on_hits = 1, result.accelerated_ms_on_hits = 0.1;
+  has("frames that miss cost it once more, and too few hit");
+  result.accelerated_ms_on_hits = 2;
+  has("even frames that hit cost more");
+}
+
 }  // namespace
 }  // namespace kpsa::engine
