@@ -111,7 +111,7 @@ Status AblationPoses::FindModes() {
   MeanShape shape = MeanShapeOf(layout, mean);
   positions = std::move(shape.positions);
   diagonal = shape.diagonal;
-  noise = NoiseOf(recorder_->signals(), layout, mean, diagonal, entry.tolerance, false);
+  noise = NoiseOf(recorder_->signals(), *training, mean, diagonal, entry.tolerance, false);
   double energy = 0;
   for (std::size_t t = 0; t < test->poses(); ++t) {
     for (std::size_t c = 0; c < layout.outputs(); ++c) energy += double{test->row(t)[c]} * test->row(t)[c];

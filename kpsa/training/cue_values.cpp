@@ -1,6 +1,7 @@
 #include "kpsa/training/cue_values.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr double kLeastDeterminant = 1e-9;  // of a matrix that is inverted
+constexpr std::size_t kScalePoses = 16;     // that say how a joint is scaled
 constexpr double kAlmostRotation = 4;       // axes of so many times the length, or one so many times shorter
 
 }  // namespace
@@ -25,9 +27,12 @@ Affine RelativeMatrix(const PoseLayout& layout, std::span<const float> row, cons
   return matrix;
 }
 
-double JointScale(const PoseLayout& layout, const Eigen::VectorXd& mean, Index first_entry) {
-  const auto first = static_cast<Eigen::Index>(layout.scalar_begin() + first_entry);
-  const double length = std::sqrt(mean.segment(first, 9).squaredNorm() / 3);
+double JointScale(const PoseMatrix& poses, const Eigen::VectorXd* mean, Index first_entry) {
+  const std::size_t stride = std::max<std::size_t>(1, poses.poses() / kScalePoses);
+  double sum = 0, count = 0;
+  for (std::size_t t = 0; t < poses.poses(); t += stride, count += 3)
+    sum += RelativeMatrix(poses.layout(), poses.row(t), mean, first_entry).leftCols<3>().squaredNorm();
+  const double length = count > 0 ? std::sqrt(sum / count) : 0;
   if (!(length > 0) || (length < kAlmostRotation && length > 1 / kAlmostRotation)) return 1;
   return std::exp2(std::round(std::log2(length)));
 }
@@ -93,7 +98,7 @@ CueSet MeasureCues(const PoseMatrix& poses, const Eigen::VectorXd& mean, std::sp
     const double variance = measured->row(row).squaredNorm() / static_cast<double>(poses.poses());
     if (cues[k].kind == CueKind::kScalar && variance > 0) set.scale[row] = 1 / std::sqrt(variance);
     if (cues[k].kind != CueKind::kScalar && cues[k].joint != kNoIndex)
-      set.scale.segment(row, 3).setConstant(JointScale(layout, mean, cues[k].joint));
+      set.scale.segment(row, 3).setConstant(JointScale(poses, &mean, cues[k].joint));
   }
   *measured = set.scale.asDiagonal() * *measured;
   return set;

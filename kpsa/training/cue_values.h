@@ -17,8 +17,8 @@ Affine RelativeMatrix(const PoseLayout& layout, std::span<const float> row, cons
                       Index first_entry);
 // How many times longer than those of a rotation the axes of such a matrix are, about: a power of two, and 1 up to four
 // times. Armatures that were exported in other units than their meshes have 100 or 0.01; without it an entry of theirs
-// would weigh so much more, and errors in the space of such a joint so much less.
-double JointScale(const PoseLayout& layout, const Eigen::VectorXd& mean, Index first_entry);
+// would weigh so much more, and errors in the space of such a joint so much less. mean: as above.
+double JointScale(const PoseMatrix& poses, const Eigen::VectorXd* mean, Index first_entry);
 // None where there is none.
 std::optional<Affine> InverseOf(const Affine& matrix);
 Affine Product(const Affine& a, const Affine& b);

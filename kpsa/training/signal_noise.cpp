@@ -15,8 +15,9 @@ constexpr double kFactorShift = 0.2;                       // tolerances: and of
 
 }  // namespace
 
-CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, const Eigen::VectorXd& mean,
+CueNoise NoiseOf(std::span<const Signal> signals, const PoseMatrix& poses, const Eigen::VectorXd& mean,
                  double diagonal, double tolerance, bool of_light) {
+  const PoseLayout& layout = poses.layout();
   CueNoise noise(diagonal);
   const double shift = kNoiseShare * tolerance;
   noise.point = std::max(noise.point, shift * shift);
@@ -24,7 +25,7 @@ CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, cons
   const std::vector<Index> first = FirstScalars(signals, layout);
   for (std::size_t s = 0; s < signals.size(); ++s) {
     if (!signals[s].matrix) continue;
-    const double scale = signals[s].relative ? JointScale(layout, mean, first[s]) : 1;
+    const double scale = signals[s].relative ? JointScale(poses, &mean, first[s]) : 1;
     for (Index e = 0; e < signals[s].entries(); ++e) {
       const double still = e < 9 ? scale * kNoiseTurn : of_light ? kLightShift : shift;
       noise.scalars[first[s] + e] = still * still;

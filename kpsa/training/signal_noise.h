@@ -12,8 +12,8 @@ namespace kpsa::engine {
 
 inline constexpr double kLightShift = 1e-4;  // of light: metres that no one would see a joint move
 
-// mean: of the poses' columns; diagonal: of the model; tolerance: scene units, as the diagonal.
-CueNoise NoiseOf(std::span<const Signal> signals, const PoseLayout& layout, const Eigen::VectorXd& mean,
+// poses: centred with mean; diagonal: of the model; tolerance: scene units, as the diagonal.
+CueNoise NoiseOf(std::span<const Signal> signals, const PoseMatrix& poses, const Eigen::VectorXd& mean,
                  double diagonal, double tolerance, bool of_light);
 // Every value is a regressor; of the matrices, only local ones have factors.
 CueProductOptions ProductOptionsOf(std::span<const Signal> signals, const PoseLayout& layout,

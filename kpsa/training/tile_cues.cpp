@@ -62,11 +62,12 @@ class View {
  public:
   View(const PoseMatrix& poses, const TileCueOptions& options, Index joint, std::vector<std::size_t> rows)
       : poses_(poses), options_(options), joint_(joint), rows_(std::move(rows)) {
+    const double scale = joint == kNoIndex ? 1 : JointScale(poses, options.mean, joint);
     for (const std::size_t t : rows_) {
       std::optional<Affine> back = Affine(Affine::Identity());
       if (joint != kNoIndex)
         back = InverseOf(RelativeMatrix(poses.layout(), poses.row(t), options.mean, joint));
-      if (back && joint != kNoIndex) *back *= JointScale(poses.layout(), *options.mean, joint);
+      if (back) *back *= scale;
       if (!back) {
         back_.clear();
         break;
@@ -111,7 +112,7 @@ class View {
         const Index entry = (cue.index - layout.relative_begin) % 12;
         while (last < cues.size() && cues[last].index == cue.index + (last - k) && entry + (last - k) < 12)
           ++last;
-        const double turn = options_.turn_reach / JointScale(layout, *options_.mean, cue.index - entry);
+        const double turn = options_.turn_reach / JointScale(poses_, options_.mean, cue.index - entry);
         for (Eigen::Index t = 0; t < poses(); ++t) {
           const Affine matrix = Product(back_[static_cast<std::size_t>(t)],
                                         RelativeMatrix(layout, RowOf(t), options_.mean, cue.index - entry));
@@ -475,8 +476,8 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
     const bool of_matrix = of.kind == CueKind::kScalar && of.index >= layout.relative_begin;
     const Index entry = of_matrix ? (of.index - layout.relative_begin) % 12 : 0;
     double reach = of.kind != CueKind::kScalar || (of_matrix && entry >= 9) ? 1 : options.turn_reach;
-    if (of_matrix && entry < 9) reach /= JointScale(layout, *options.mean, of.index - entry);
-    if (of.joint != kNoIndex) reach *= JointScale(layout, *options.mean, of.joint);
+    if (of_matrix && entry < 9) reach /= JointScale(poses, options.mean, of.index - entry);
+    if (of.joint != kNoIndex) reach *= JointScale(poses, options.mean, of.joint);
     unit[i] = reach / set.scale[row];
   }
   const View view(poses, options, joint, EveryPose(poses, 1));

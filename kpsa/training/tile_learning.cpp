@@ -184,7 +184,7 @@ TileSubspace TeachTiles(const TileSubspace& made, std::span<const char> taught, 
       fitted.mean -= shift;
       fitted.target.colwise() += shift;
       for (Index e = 0; e < 12 && joint != kNoIndex; ++e) fitted.joint_rows.push_back(row_of.at(joint + e));
-      if (joint != kNoIndex) fitted.joint_scale = JointScale(poses.layout(), *training.cues.mean, joint);
+      if (joint != kNoIndex) fitted.joint_scale = JointScale(poses, training.cues.mean, joint);
       return fitted;
     };
     TileData known = map.data();

@@ -118,7 +118,7 @@ TileModel ModelOf(const TileChoice& choice, std::size_t tile, const PoseMatrix& 
     KPSA_CHECK(entry != cues.cues.end());
     fitted.joint_rows.push_back(cues.offsets[static_cast<std::size_t>(entry - cues.cues.begin())]);
   }
-  if (joint != kNoIndex) fitted.joint_scale = JointScale(poses.layout(), *options.mean, joint);
+  if (joint != kNoIndex) fitted.joint_scale = JointScale(poses, options.mean, joint);
   return fitted;
 }
 

@@ -101,7 +101,7 @@ Status FindModes(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes
   modes->still = !setup.of_light() && setup.options.mode == EstimatorMode::kMap &&
                  IsStill(modes->pca, setup.options.tolerance);
   if (modes->still) modes->pca = TruncatedPca(modes->pca, 1);
-  modes->noise = NoiseOf(setup.recorder->signals(), setup.layout, mean, modes->diagonal,
+  modes->noise = NoiseOf(setup.recorder->signals(), poses->poses, mean, modes->diagonal,
                          setup.options.tolerance, setup.of_light());
   record->diagonal = modes->diagonal;
   record->motion_rms =

@@ -146,14 +146,14 @@ TEST(TileCues, JointsOfAnyScaleTellAsMuch) {
     EXPECT_LT(limb.LargestError(LimbPoses(200, 2, scale)), of_two ? 1.01 * error : 0.3 * kLimbTolerance)
         << scale;
   }
-  Eigen::VectorXd mean = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(LimbLayout().columns()));
-  const auto first = static_cast<Eigen::Index>(LimbLayout().scalar_begin() + kUpperEntry);
-  for (const double length : {0.3, 1.0, 3.0}) {
-    mean[first] = mean[first + 4] = mean[first + 8] = length;
-    EXPECT_EQ(JointScale(LimbLayout(), mean, kUpperEntry), 1) << length;
+  for (const auto& [scale, expected] :
+       {std::pair{1.0, 1.0}, {0.3, 1.0}, {3.0, 1.0}, {100.0, 128.0}, {0.01, 1.0 / 128}}) {
+    PoseMatrix poses = LimbPoses(50, 3, scale);
+    EXPECT_EQ(JointScale(poses, nullptr, kUpperEntry), expected);
+    const Eigen::VectorXd mean = poses.Mean();
+    poses.Subtract(mean);
+    EXPECT_EQ(JointScale(poses, &mean, kLowerEntry), expected) << "however far it turns";
   }
-  mean.segment(first, 9) *= 100.0 / 3;
-  EXPECT_EQ(JointScale(LimbLayout(), mean, kUpperEntry), 128);
 }
 
 // Before any tile is stored: what is beyond even then is the least that they miss.
