@@ -9,24 +9,24 @@
 namespace kpsa::engine {
 namespace {
 
-// Where times lie between keys is told in single precision, in which the keys' times are (glTF 2.0, 3.11): frame 8 of 24
-// is a third of a second, which a file may have as 0.33333334. And an ulp later, as i * (1 / 24) comes out elsewhere.
-double ToLookUp(double seconds) {
+// Keys have times of single precision (glTF 2.0, 3.11), and frames do not: frame 8 of 24 is a third of a second, which a
+// file may have as 0.33333334, and an ulp later, where i * (1 / 24) came out like that. What holds its keys is told by
+// times that are rounded as they are.
+double AsKeysAre(double seconds) {
   constexpr double kUlp = 0x1p-23;
   return static_cast<float>(seconds + kUlp * std::abs(seconds));
 }
 
+// seconds: at least the time of the key, and before the next one.
 KeySpan SpanFrom(std::span<const float> times, std::size_t key, double seconds) {
-  const double start = times[key], width = static_cast<double>(times[key + 1]) - start;
-  return {key, std::max(0.0, (seconds - start) / width), width};
+  const double start = times[key], next = times[key + 1], width = next - start;
+  return {key, (seconds - start) / width, width, AsKeysAre(seconds) >= next ? key + 1 : key};
 }
 
 KeySpan Find(std::span<const float> times, double seconds) {
-  const double first = times.front(), last = times.back();
-  if (!(seconds > first)) return {};  // NaN goes to the first key
-  const double looked_up = seconds < last ? ToLookUp(seconds) : last;
-  if (looked_up >= last) return {times.size() - 1, 0, 0};
-  const auto next = std::upper_bound(times.begin(), times.end(), looked_up,
+  if (!(seconds > static_cast<double>(times.front()))) return {};  // NaN goes to the first key
+  if (seconds >= static_cast<double>(times.back())) return {times.size() - 1, 0, 0, times.size() - 1};
+  const auto next = std::upper_bound(times.begin(), times.end(), seconds,
                                      [](double s, float t) { return s < static_cast<double>(t); });
   return SpanFrom(times, static_cast<std::size_t>(next - times.begin()) - 1, seconds);
 }
@@ -41,8 +41,9 @@ double At(const SamplerKeys& keys, std::size_t key, Part part, std::size_t compo
 }
 
 double Sample(const SamplerKeys& keys, const KeySpan& span, std::size_t component) {
+  if (keys.interpolation == Interpolation::kStep) return At(keys, span.held, kValue, component);
   const double v0 = At(keys, span.key, kValue, component);
-  if (span.t == 0 || keys.interpolation == Interpolation::kStep) return v0;
+  if (span.t == 0) return v0;
   const double v1 = At(keys, span.key + 1, kValue, component), t = span.t;
   if (keys.interpolation == Interpolation::kLinear) return v0 + (v1 - v0) * t;
   // glTF 2.0, appendix C.5: Hermite with tangents a second
@@ -95,22 +96,20 @@ KeyTimes::KeyTimes(std::vector<float> times) : times_(std::move(times)) {
 
 KeySpan KeyTimes::Find(double seconds) const {
   if (!(seconds > first_)) return {};
-  const double looked_up = seconds < last_ ? ToLookUp(seconds) : last_;
-  if (looked_up >= last_) return {times_.size() - 1, 0, 0};
+  if (seconds >= last_) return {times_.size() - 1, 0, 0, times_.size() - 1};
   const auto at = [&](std::size_t key) { return static_cast<double>(times_[key]); };
-  const std::size_t guess =
-      std::min(static_cast<std::size_t>((looked_up - first_) * rate_), times_.size() - 2);
-  if (at(guess) <= looked_up && looked_up < at(guess + 1)) return SpanFrom(times_, guess, seconds);
-  // at(low) <= looked_up < at(high); close in from the guess by doubling steps, then by halves
+  const std::size_t guess = std::min(static_cast<std::size_t>((seconds - first_) * rate_), times_.size() - 2);
+  if (at(guess) <= seconds && seconds < at(guess + 1)) return SpanFrom(times_, guess, seconds);
+  // at(low) <= seconds < at(high); close in from the guess by doubling steps, then by halves
   std::size_t low = 0, high = times_.size() - 1;
   for (std::size_t from = guess, step = 1; from > low && from < high; step *= 2) {
-    const bool below = at(from) <= looked_up;
+    const bool below = at(from) <= seconds;
     (below ? low : high) = from;
     from = below ? from + step : from - std::min(step, from);
   }
   while (high - low > 1) {
     const std::size_t middle = (low + high) / 2;
-    (at(middle) <= looked_up ? low : high) = middle;
+    (at(middle) <= seconds ? low : high) = middle;
   }
   return SpanFrom(times_, low, seconds);
 }
@@ -143,7 +142,8 @@ Quaternion RotationTrack::At(const KeySpan& span) const {
     return Normalized(
         {Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
   }
-  if (span.t == 0 || step_) return keys_[span.key].rotation;
+  if (step_) return keys_[span.held].rotation;
+  if (span.t == 0) return keys_[span.key].rotation;
   return Between(keys_.data() + span.key, span.t);
 }
 
@@ -173,7 +173,8 @@ Double3 SampleVec3(const SamplerKeys& keys, double seconds) {
 Quaternion SampleRotation(const SamplerKeys& keys, double seconds) {
   KPSA_CHECK_EQ(keys.components, 4u);
   const KeySpan span = Find(keys.times, seconds);
-  if (span.t == 0 || keys.interpolation == Interpolation::kStep) return KeyRotation(keys, span.key);
+  if (keys.interpolation == Interpolation::kStep) return KeyRotation(keys, span.held);
+  if (span.t == 0) return KeyRotation(keys, span.key);
   if (keys.interpolation == Interpolation::kLinear) {
     return Slerp(KeyRotation(keys, span.key), KeyRotation(keys, span.key + 1), span.t);
   }

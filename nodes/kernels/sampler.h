@@ -25,11 +25,12 @@ struct SamplerKeys {
 };
 
 // Between which keys a time lies: value = key `key` at t = 0 to key `key + 1` at t = 1, `width` seconds
-// apart. At and beyond the ends, and for NaN, t is 0. A key counts as reached up to two ulps (of single
-// precision) before its time.
+// apart. At and beyond the ends, and for NaN, t is 0.
 struct KeySpan {
   std::size_t key = 0;
   double t = 0, width = 0;
+  std::size_t held =
+      0;  // the key that kStep shows: the next one already up to two ulps (of single precision) before it
 };
 
 // Ascending times that several channels may share. A look-up starts where the key would be if all were evenly
