@@ -114,7 +114,7 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   if (!results.ok()) return results.status();
   if (flags.idle) KPSA_RETURN_IF_ERROR(AddIdle(flags, *clips, &*results));
   results->front().notes.insert(results->front().notes.begin(), notes.begin(), notes.end());
-  const BenchContext context{flags.file, flags.kpsa, options};
+  const BenchContext context{flags.file, flags.kpsa, options, !flags.sets.empty() || flags.pose.has_value()};
   Print(flags.json ? BenchJson(*results, context) : BenchText(*results, context));
   if (flags.per_frame && !flags.json) Print("\n" + FramesText(*results));
   for (const BenchResult& result : *results) {

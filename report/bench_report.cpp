@@ -166,7 +166,7 @@ std::string BenchText(const std::vector<BenchResult>& results, const BenchContex
   std::string text;
   for (const BenchResult& result : results) text += (text.empty() ? "" : "\n\n") + SideText(result, context);
   const std::string with = context.kpsa.empty() ? "--accelerate" : "--kpsa " + context.kpsa.front();
-  if (results.size() == 1 && MayLearn(results.front()))
+  if (results.size() == 1 && !context.set && MayLearn(results.front()))
     return text +
            fmt::format(
                "\nnext: kpsa learn {}{} --clips {} --force, which trains again, with what misses here\n",

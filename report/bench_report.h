@@ -12,6 +12,8 @@ struct BenchContext {
   std::string rig;                // as the user named it
   std::vector<std::string> kpsa;  // --kpsa
   BenchOptions options;
+  bool set =
+      false;  // controls hold other values than the clips and the rig give them: learning would not see them
 };
 
 // One object, that of the first side; those of the others stand in its list "beside". Times in milliseconds,

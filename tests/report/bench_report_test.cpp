@@ -48,6 +48,9 @@ TEST(BenchReport, SaysWhySlowerAndWhatToDoWhereFramesMiss) {
   has("next: kpsa learn man.yaml --clips walk,run --force, which trains again");
   context.kpsa = {"old.kpsa"};
   has("next: kpsa learn man.yaml --kpsa old.kpsa --clips walk,run --force");
+  context.set = true;  // learning would not set it
+  has("next: kpsa eval man.yaml");
+  context.set = false;
   result.clips = {"(rest)"};
   has("next: kpsa eval man.yaml --kpsa old.kpsa -o fast.npz");
   result.clips = {"walk"}, result.hits = 5;
