@@ -9,7 +9,8 @@ others=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON -DKPSA_TESTS_BY_ROOM=ON > /dev/null
 cmake --build build
 wait $others || echo "Blender, Chromium or shells could not be installed: their tests are skipped"
-ctest --test-dir build --output-on-failure -j "$(nproc)"
+# One more than processors: tests wait for programs and browsers a quarter of the time
+ctest --test-dir build --output-on-failure -j "$(($(nproc) + 1))"
 # Tests within a process that said that they are skipped, and why
 awk '/: Skipped$/ {getline why} /^\[  SKIPPED \] .* ms\)$/ {print $4 " was skipped: " why}' build/Testing/Temporary/LastTest.log
 sh tests/sanitize.sh

@@ -27,5 +27,5 @@ sh tests/package/whole.sh . $folder/project
 cmake -S $folder/project -B $folder -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g0" \
   -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON -DKPSA_PROGRAM=ON -DKPSA_SANITIZE_ALL=$all > /dev/null
 cmake --build $folder
-ctest --test-dir $folder/kpsa --output-on-failure -j "$(nproc)"
+ctest --test-dir $folder/kpsa --output-on-failure -j "$(($(nproc) + 1))"
 sh tests/package/embed.sh . $folder $folder/embedded
