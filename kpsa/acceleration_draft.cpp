@@ -1,6 +1,7 @@
 #include "kpsa/acceleration_draft.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <unordered_map>
 
@@ -154,6 +155,7 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
       FindSignals(graph, compiler, plugs, varying, CarriedNodes(graph, target, subspace), &unguarded);
   if (!signals.ok()) return signals.status();
   if (!unguarded.empty()) draft->AlwaysMiss(unguarded[0] + " varies and cannot be guarded");
+  const bool limited = std::isfinite(subspace.activity_limit);
   for (const Signal& signal : *signals) {
     double rest[12];
     bool have_rest = false;
@@ -163,6 +165,7 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
       if (const auto it = ranges.find(target.within.Inner(EntryName(signal, e))); it != ranges.end()) {
         range.lo = it->second->lo, range.hi = it->second->hi, range.ramp = it->second->ramp;
         range.patches = it->second->patches;
+        range.rest = it->second->rest, range.reach = it->second->reach;
       } else {
         if (!have_rest) KPSA_RETURN_IF_ERROR(RestEntries(graph, compiler, signal, rest));
         have_rest = true;
@@ -171,6 +174,10 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
       (signal.matrix ? data.matrix_lo : data.scalar_lo).push_back(range.lo);
       (signal.matrix ? data.matrix_hi : data.scalar_hi).push_back(range.hi);
       (signal.matrix ? data.matrix_ramp : data.scalar_ramp).push_back(range.ramp);
+      if (limited) {
+        (signal.matrix ? data.matrix_rest : data.scalar_rest).push_back(range.rest);
+        (signal.matrix ? data.matrix_per_reach : data.scalar_per_reach).push_back(range.per_reach());
+      }
       patches |= range.patches;
     }
     (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(patches);
@@ -240,6 +247,10 @@ class CueSignals {
     add(signal.matrix ? &data.matrix_lo : &data.scalar_lo, -kAnything);
     add(signal.matrix ? &data.matrix_hi : &data.scalar_hi, kAnything);
     add(signal.matrix ? &data.matrix_ramp : &data.scalar_ramp, 0);
+    if (std::isfinite(data.subspace->activity_limit)) {
+      add(signal.matrix ? &data.matrix_rest : &data.scalar_rest, 0);
+      add(signal.matrix ? &data.matrix_per_reach : &data.scalar_per_reach, 0);
+    }
     (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(kAllPatches);
     return place->second;
   }

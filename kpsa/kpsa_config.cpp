@@ -59,8 +59,10 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(product.hi);
   }
   hasher.AddLong(std::span<const Index>(data_.joints));
+  hasher.Add(s.activity_limit);
   for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,
-                            &data_.scalar_hi, &data_.scalar_ramp})
+                            &data_.scalar_hi, &data_.scalar_ramp, &data_.matrix_rest, &data_.matrix_per_reach,
+                            &data_.scalar_rest, &data_.scalar_per_reach})
     hasher.AddLong(std::span<const double>(*range));
   for (const auto* patches : {&data_.matrix_patches, &data_.scalar_patches})
     hasher.AddLong(std::span<const std::uint64_t>(*patches));
@@ -117,6 +119,8 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
       }
       return "bent farther than the trained poses";
     }
+    case MissReason::kManyAtOnce:
+      return "more is far from rest at once than in poses that frames are like";
     case MissReason::kSpace:
       return fmt::format("{} is stretched, mirrored or scaled as it was not in training", data.stretched);
     case MissReason::kNotFinite:

@@ -9,6 +9,7 @@
 
 #include "base/check.h"
 #include "base/matrix.h"
+#include "kpsa/activity.h"
 #include "kpsa/bound_patches.h"
 #include "kpsa/cue_gather.h"
 #include "kpsa/matrix_entries.h"
@@ -132,6 +133,25 @@ GuardVerdict AskGuards(KpsaContext c, const KpsaConfig::Data& data, bool in_part
   return verdict;
 }
 
+// The share of the full evaluation that is asked for by how much is far from rest at once.
+double ManyAtOnce(KpsaContext c, const KpsaConfig::Data& data) {
+  const double limit = data.subspace->activity_limit;
+  if (!(limit < std::numeric_limits<double>::infinity())) return 0;
+  double activity = 0;
+  const ArrayView<Matrix4> matrices = c.get<"matrices">();
+  for (std::uint32_t j = 0; j < matrices.size(); ++j) {
+    const double *rest = data.matrix_rest.data() + 12 * j, *per_reach = data.matrix_per_reach.data() + 12 * j;
+    double most = 0;
+    for (std::size_t e = 0; e < 12; ++e)
+      most = std::max(most, ActivityOf(matrices[j].m[4 * (e / 3) + e % 3], rest[e], per_reach[e]));
+    activity += most;
+  }
+  const ArrayView<double> scalars = c.get<"scalars">();
+  for (std::uint32_t k = 0; k < scalars.size(); ++k)
+    activity += ActivityOf(scalars[k], data.scalar_rest[k], data.scalar_per_reach[k]);
+  return ActivityWeight(limit, activity);
+}
+
 constexpr double kStretchSlack = 0.05;  // of the tolerance: displacement that a stretch may cause unnoticed,
 constexpr double kStretchRamp = 1;      // and by which the full evaluation is alone
 constexpr double kStretchRounding = 2e-6;  // matrices of a file are products of floats
@@ -190,7 +210,7 @@ std::uint64_t Decide(KpsaContext c) {
   const std::span<float> y(Measured(c), padded), g(c.scratch() + 2 * padded, padded);
   const std::size_t patches = kernel.patches.count();
   GuardVerdict guard;
-  double stretch = 0;
+  double stretch = 0, many = 0;
   {
     const Stopwatch watch(c, KpsaPart::kCues);
     if (!any) {
@@ -198,6 +218,8 @@ std::uint64_t Decide(KpsaContext c) {
       if (guard.all >= 1) return miss(MissReason::kOutOfRange, guard.offender);
       stretch = StretchWeight(data, frame);
       if (stretch >= 1) return miss(MissReason::kSpace, kNoIndex);
+      many = ManyAtOnce(c, data);
+      if (many >= 1) return miss(MissReason::kManyAtOnce, kNoIndex);
     }
     kernel.gather.Gather({c.get<"cues">(), c.get<"matrices">(), c.get<"scalars">(), frame.world_from_space},
                          c.scratch() + 3 * padded, raw);
@@ -218,10 +240,11 @@ std::uint64_t Decide(KpsaContext c) {
     if (weight > verdict.full_weight)
       verdict.full_weight = weight, verdict.reason = reason, verdict.offender = offender;
   };
-  all = std::max({all, guard.all, stretch});
+  all = std::max({all, guard.all, stretch, many});
   ask(guard.all, MissReason::kOutOfRange, guard.offender);
   ask(guard.part, MissReason::kOutOfRange, guard.offender_of_part);
   ask(stretch, MissReason::kSpace, kNoIndex);
+  ask(many, MissReason::kManyAtOnce, kNoIndex);
   verdict.hit = verdict.full_weight == 0;
   state.patches.all = all;
   if (patches > 0 && finite) {

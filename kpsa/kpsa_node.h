@@ -61,6 +61,9 @@ class KpsaConfig final : public Asset {
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;      // [12 * matrices]
     std::vector<double> scalar_lo, scalar_hi, scalar_ramp;      // [scalars]
     std::vector<std::uint64_t> matrix_patches, scalar_patches;  // [matrices], [scalars] TrainedRange::patches
+    // TrainedRange::rest and per_reach of the same, where there is a limit (kpsa/activity.h); else empty
+    std::vector<double> matrix_rest, matrix_per_reach;  // [12 * matrices]
+    std::vector<double> scalar_rest, scalar_per_reach;  // [scalars]
     std::vector<Index> joints;   // into matrices: in whose spaces cues are measured, at most kMaxCueJoints
     std::vector<char> relative;  // [matrices] world matrices, measured relative to spaceMatrix's frame
     std::vector<std::string> guard_names;  // matrices, then scalars

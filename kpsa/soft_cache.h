@@ -38,6 +38,7 @@ enum class MissReason : std::uint8_t {
   kNeverHit,    // the tolerance is zero, or no threshold keeps the violation rate
   kDoubt,       // what a tile's products say is above tau_lo; `offender` is the tile (kpsa/subspace.h)
   kSpace,       // the space is stretched, mirrored or scaled as it was not in training
+  kManyAtOnce,  // more is far out of rest at once than in poses that frames are like (kpsa/activity.h)
 };
 
 struct Verdict {
@@ -98,6 +99,10 @@ struct TrainedRange {
   double lo = 0, hi = 0;  // seen in training, or too near to it to matter
   double ramp = 0;  // from lo - ramp down and hi + ramp up nothing but the full evaluation is left, >= 0
   std::uint64_t patches = kAllPatches;  // that it speaks of, a bit each (kpsa/patches.h)
+  double rest = 0;                      // what it is at rest, and
+  double reach =
+      0;  // how far from there training went, or 0 where that hardly moved a point (kpsa/activity.h)
+  double per_reach() const { return reach > 0 ? 1 / reach : 0; }
 };
 // [min, max] widened on both sides by `slack` (what moves no point noticeably) and by rounding (1e-6 of the
 // magnitude, of at least 1: an entry that rested at 0 in training may come out as 1e-11).

@@ -129,6 +129,8 @@ Status ValidateSubspace(const Subspace& s) {
   if (s.score.doubt > 0 && (s.doubt_inputs() == 0 || !s.latent.empty()))
     return Status::Invalid("the score counts doubts, but no tile has products");
   KPSA_RETURN_IF_ERROR(CheckPatches(s));
+  if (!(s.activity_limit > 0))
+    return Status::Invalid("the limit of activity is {}, expected a positive number", s.activity_limit);
   if (!s.latent.empty() && (rows == 0 || s.latent.size() % rows != 0 || !AllFinite<float>(s.latent)))
     return Status::Invalid("the {} latent factors of {} rows make no sense", s.latent.size(), rows);
   if (!AllFinite<double>(s.cue_mean) || !AllFinite<double>(s.cue_scale) ||
@@ -188,7 +190,8 @@ Status ValidateSubspace(const Subspace& s) {
     }
   }
   for (const TrainedRange& range : s.ranges) {
-    if (range.plug.empty() || !(range.lo <= range.hi) || !(range.ramp >= 0)) {
+    if (range.plug.empty() || !(range.lo <= range.hi) || !(range.ramp >= 0) || !std::isfinite(range.rest) ||
+        !(range.reach >= 0)) {
       return Status::Invalid("the trained range of \"{}\" is [{}, {}], with a ramp of {}", range.plug,
                              range.lo, range.hi, range.ramp);
     }

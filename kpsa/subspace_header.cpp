@@ -173,11 +173,12 @@ int VersionOf(const Subspace& s) {
   const bool held = std::ranges::any_of(s.calibration, [](const CalibrationPair& pair) {
     return pair.kind == static_cast<int>(PoseKind::kHeld);
   });
-  return held               ? kHeldVersion
-         : partial          ? kPartialVersion
-         : !s.mends.empty() ? kMendsVersion
-         : s.of_inner()     ? kInnerVersion
-                            : kListsVersion;
+  return std::isfinite(s.activity_limit) ? kActivityVersion
+         : held                          ? kHeldVersion
+         : partial                       ? kPartialVersion
+         : !s.mends.empty()              ? kMendsVersion
+         : s.of_inner()                  ? kInnerVersion
+                                         : kListsVersion;
 }
 
 }  // namespace
@@ -202,6 +203,7 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
                   {"violationRate", s.violation_rate},
                   {"blendStart", s.blend_start},
                   {"score", {s.score.measured, s.score.doubt}}};
+  if (std::isfinite(s.activity_limit)) summary["activityLimit"] = s.activity_limit;
   if (s.patches.tiles > 0) {
     summary["tilesOfPatch"] = s.patches.tiles;
     summary["patchShare"] = s.patches.share;
@@ -236,6 +238,7 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace
       return Status::Invalid("summary: \"score\" should be two numbers");
     s->score = {score[0].get<double>(), score[1].get<double>()};
   }
+  if (summary->contains("activityLimit")) s->activity_limit = reader.Number("activityLimit");
   if (summary->contains("tilesOfPatch")) {
     s->patches.tiles = reader.Count("tilesOfPatch", kMaxPoints);
     s->patches.share = reader.Number("patchShare");

@@ -1,5 +1,6 @@
 #include "kpsa/subspace_lists.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "files/json_depth.h"
@@ -16,8 +17,9 @@ constexpr char kMendsKey[] = "mends", kMendPointsKey[] = "mendPoints", kMendInne
 constexpr char kCueKindsKey[] = "cueKinds", kCuesKey[] = "cues", kFactorsKey[] = "factors",
                kFactorCurvesKey[] = "factorCurves", kProductBoundsKey[] = "productBounds",
                kRangeNamesKey[] = "rangeNames", kRangesKey[] = "ranges", kRangePatchesKey[] = "rangePatches",
-               kControlsKey[] = "controls", kSignatureNodesKey[] = "signatureNodes",
-               kSignatureAttributesKey[] = "signatureAttributes", kTrainingKey[] = "training";
+               kRangeReachKey[] = "rangeReach", kControlsKey[] = "controls",
+               kSignatureNodesKey[] = "signatureNodes", kSignatureAttributesKey[] = "signatureAttributes",
+               kTrainingKey[] = "training";
 
 // Rows of numbers: a tensor [rows, columns].
 template <typename T>
@@ -128,16 +130,18 @@ Status ReadCues(const SafetensorsFile& file, NameTable* names, Subspace* s) {
 
 void AddRanges(const Subspace& s, NameNumbers* names, SafetensorsWriter* writer) {
   std::vector<std::uint32_t> plugs;
-  Rows<double> ranges(3);
+  Rows<double> ranges(3), reach(2);
   std::vector<std::uint64_t> patches;
   for (const TrainedRange& range : s.ranges) {
     plugs.push_back(names->Of(range.plug));
     ranges.Add({range.lo, range.hi, range.ramp});
+    reach.Add({range.rest, range.reach});
     patches.push_back(range.patches);
   }
   Add<std::uint32_t>(writer, kRangeNamesKey, plugs);
   ranges.AddTo(writer, kRangesKey);
   Add<std::uint64_t>(writer, kRangePatchesKey, patches);
+  if (std::isfinite(s.activity_limit)) reach.AddTo(writer, kRangeReachKey);
 }
 
 Status ReadRanges(const SafetensorsFile& file, NameTable* names, Subspace* s) {
@@ -149,10 +153,14 @@ Status ReadRanges(const SafetensorsFile& file, NameTable* names, Subspace* s) {
   const Result<std::vector<std::uint64_t>> patches =
       file.Values<std::uint64_t>(kRangePatchesKey, {ranges.size()});
   if (!patches.ok()) return patches.status();
+  Rows<double> reach(2);
+  const bool has_reach = std::isfinite(s->activity_limit);
+  if (has_reach) KPSA_RETURN_IF_ERROR(reach.Read(file, kRangeReachKey, ranges.size()));
   s->ranges.reserve(ranges.size());
   for (std::size_t i = 0; i < ranges.size(); ++i) {
     const std::span<const double> row = ranges[i];
     s->ranges.push_back({"", row[0], row[1], row[2], (*patches)[i]});
+    if (has_reach) s->ranges.back().rest = reach[i][0], s->ranges.back().reach = reach[i][1];
     KPSA_RETURN_IF_ERROR(names->Take((*plugs)[i], &s->ranges.back().plug));
     if ((*patches)[i] == 0)
       return Status::Invalid("the trained range of \"{}\" speaks of no patch", s->ranges.back().plug);

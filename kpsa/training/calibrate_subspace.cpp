@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "kpsa/activity.h"
+#include "kpsa/binomial.h"
 #include "kpsa/training/carried.h"
 #include "kpsa/training/guard_parts.h"
 #include "kpsa/training/pose_judge.h"
@@ -22,7 +24,10 @@ constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it 
 constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kCalibrationSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
-                        kTrialSeed = 0x6a09e667f3bcc908ull;
+                        kTrialSeed = 0x6a09e667f3bcc908ull, kManySeed = 0xa54ff53a5f1d36f1ull;
+constexpr std::size_t kMostWithMany = 400;  // poses with many controls far out
+constexpr double kBeyondPlayed = 1.25;      // of the activity of what was played: clips go a little farther
+constexpr int kMixtures = static_cast<int>(PoseKind::kMixture);
 
 // Judged poses of every kind.
 struct JudgedSet {
@@ -42,12 +47,9 @@ Result<Carried> TryCarried(const Calibrator& of, const CalibrationWork& work) {
                      of.options.tolerance);
 }
 
-// New poses of a kind, a few at a time. All but those beyond the ranges widen these.
-Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, std::uint64_t seed,
-                  std::span<const double> margins, PoseJudge* judge, JudgedSet* judged) {
-  const auto pose_kind = static_cast<PoseKind>(kind);
-  const std::vector<SampledPose> drawn = work.sampler->Of(
-      pose_kind, of.size.poses, (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
+// A few at a time. widen: the ranges hold them.
+Status JudgeDrawn(const Calibrator& of, const CalibrationWork& work, std::span<const SampledPose> drawn,
+                  int kind, bool widen, PoseJudge* judge, JudgedSet* judged) {
   for (std::size_t first = 0; first < drawn.size(); first += kPosesAtOnce) {
     // By clip, as the recorder writes them
     std::vector<SampledPose> some(
@@ -59,12 +61,32 @@ Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, s
     for (const JudgedPose& pose : judge->Judge(recorded)) judged->judges.push_back({pose, 0, kind});
     for (std::size_t t = 0; t < recorded.poses(); ++t) {
       const std::span<const float> row = std::as_const(recorded).row(t).subspan(of.layout.scalar_begin());
-      if (pose_kind != PoseKind::kBeyond) work.ranges->Widen(row);
+      if (widen) work.ranges->Widen(row);
       judged->entries.emplace_back(row.begin(), row.end());
     }
     judged->poses.insert(judged->poses.end(), some.begin(), some.end());
   }
   return Status();
+}
+
+// New poses of a kind. All but those beyond the ranges widen these.
+Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, std::uint64_t seed,
+                  std::span<const double> margins, PoseJudge* judge, JudgedSet* judged) {
+  const std::vector<SampledPose> drawn =
+      work.sampler->Of(static_cast<PoseKind>(kind), of.size.poses,
+                       (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
+  return JudgeDrawn(of, work, drawn, kind, kind != kBeyond, judge, judged);
+}
+
+// All scalars at rest.
+Result<std::vector<float>> RestScalars(const Calibrator& of, const CalibrationWork& work) {
+  if (of.rig.target.colors) return std::vector<float>();
+  SampledPose rest;
+  for (const ControlRange& control : of.rig.controls) rest.values.push_back(control.rest);
+  PoseMatrix recorded(of.layout);
+  KPSA_RETURN_IF_ERROR(work.recorder->AddSamples({rest}, of.clips, &recorded));
+  const std::span<const float> row = std::as_const(recorded).row(0).subspan(of.layout.scalar_begin());
+  return std::vector<float>(row.begin(), row.end());
 }
 
 // A range speaks of the patches that need what it watches, where patches miss by themselves.
@@ -88,17 +110,20 @@ struct Guarded {
 };
 // judged: poses within the ranges; those beyond come from here. outside: of FoundMargins.
 Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const RangeMargins& margins,
-                      const std::vector<char>& guarded, const Subspace& subspace, PoseJudge* judge,
-                      JudgedSet judged, JudgedSet outside) {
+                      const std::vector<char>& guarded, std::span<const float> rest, const Subspace& subspace,
+                      PoseJudge* judge, JudgedSet judged, JudgedSet outside) {
   KPSA_RETURN_IF_ERROR(of.rig.set_clip(std::nullopt));
   RangeFinder finder = *work.ranges;
   for (const std::vector<float>& entries : margins.entries) finder.Widen(entries);
   Result<std::vector<TrainedRange>> ranges =
       finder.Make(of.rig, work.compiler, of.guards,
-                  {of.options.tolerance, of.options.range_ramp, of.diagonal, of.inverse_rest_stretch});
+                  {of.options.tolerance, of.options.range_ramp, of.diagonal, of.inverse_rest_stretch, rest});
   if (!ranges.ok()) return ranges.status();
   Guarded result{subspace, {}, 0};
   result.subspace.ranges = std::move(*ranges);
+  for (std::size_t e = 0; e < guarded.size(); ++e) {
+    if (!guarded[e]) result.subspace.ranges[e].reach = 0;
+  }
   KPSA_RETURN_IF_ERROR(GuardPatches(of, work, &result.subspace));
   if (judged.judges.empty()) return result;
   KPSA_RETURN_IF_ERROR(JudgePoses(of, work, kBeyond, kScoreSeed, margins.of_controls, judge, &judged));
@@ -155,6 +180,40 @@ Calibrated CalibrateWith(const Calibrator& of, const Guarded& guarded, const std
   }
   result.missed /= std::max(kinds, 1);
   return result;
+}
+
+// Where poses with many controls far out hit and are wrong, more often than is promised of a kind, activity is limited to
+// what frames are like. The subspace has its ranges and its calibration, which is of `judged`.
+Status LimitActivity(const Calibrator& of, const CalibrationWork& work, const std::vector<char>& guarded,
+                     const SoftCacheThreshold& threshold, const JudgedSet& judged, PoseJudge* judge,
+                     Subspace* subspace) {
+  std::vector<SampledPose> drawn = PosesWithMany(
+      work.sampler->drawn(), std::min(of.size.poses, kMostWithMany), of.options.seed ^ kManySeed);
+  for (SampledPose& pose : drawn) {  // tilts rest
+    for (std::size_t c = pose.values.size(); c < of.rig.controls.size(); ++c)
+      pose.values.push_back(of.rig.controls[c].rest);
+  }
+  JudgedSet many;
+  KPSA_RETURN_IF_ERROR(JudgeDrawn(of, work, drawn, kMixtures, false, judge, &many));
+  AskGuards(subspace->ranges, guarded, many.entries, subspace->patches.patches, &many.judges);
+  const std::vector<CalibrationPair> pairs = PairsOf(*subspace, many.judges);
+  const auto wrong = static_cast<std::size_t>(std::ranges::count_if(
+      pairs, [&](const CalibrationPair& pair) { return IsWrong(pair, threshold, subspace->tolerance); }));
+  const double promised =
+      std::max(subspace->violation_rate, BinomialUpperBound(0, pairs.size(), kCalibrationConfidence));
+  if (BinomialUpperBound(wrong, pairs.size(), kCalibrationConfidence) <= promised) return Status();
+  std::vector<std::size_t> entries_of;
+  for (const Signal& signal : of.guards) entries_of.push_back(signal.entries());
+  double played = 0;
+  const auto play = [&](std::span<const float> entries) {
+    played = std::max(played, Activity(subspace->ranges, entries_of, entries));
+  };
+  for (const std::vector<float>& entries : work.ranges->played()) play(entries);
+  for (std::size_t i = 0; i < judged.poses.size(); ++i) {
+    if (judged.poses[i].kind != PoseKind::kBeyond) play(judged.entries[i]);
+  }
+  if (played > 0) subspace->activity_limit = kBeyondPlayed * played;
+  return Status();
 }
 
 std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
@@ -250,12 +309,14 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   }
   KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.98));
   const std::vector<char> guarded = GuardedEntries(of.guards, *of.rig.graph, carried->rigid);
+  const Result<std::vector<float>> rest = RestScalars(of, work);
+  if (!rest.ok()) return rest.status();
   std::vector<Guarded> tried;  // by margins
   std::size_t taken = 0;
   double least = std::numeric_limits<double>::infinity();
   for (const RangeMargins& some : margins) {
     if (some.told_by_doubts && tried[taken].subspace.score.doubt == 0) continue;
-    Result<Guarded> one = Guard(of, work, some, guarded, *subspace, &score_judge, scoring, outside);
+    Result<Guarded> one = Guard(of, work, some, guarded, *rest, *subspace, &score_judge, scoring, outside);
     if (!one.ok()) return one.status();
     const double ns = one->chosen.cost.ns + one->outside;
     tried.push_back(std::move(*one));
@@ -295,6 +356,9 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     }
   }
   *subspace = std::move(best.subspace);
+  if (!of.rig.target.colors)
+    KPSA_RETURN_IF_ERROR(
+        LimitActivity(of, work, guarded, best.calibration.threshold, best.judged, &judge, subspace));
   work.record->calibration_poses = best.judged.poses.size();
   work.record->separation = best.separation;
   FrameCost cost = tried[of_best].chosen.cost;

@@ -40,7 +40,7 @@ Status FindRanges(TrainingSetup* setup, const TrainingPoses& poses, RangeFinder*
   *ranges = RangeFinder(setup->layout);
   ranges->Widen(poses.poses);
   if (poses.spare) ranges->Widen(*poses.spare);
-  for (const PoseMatrix& learnt : poses.learnt) ranges->Widen(learnt);
+  for (const PoseMatrix& learnt : poses.learnt) ranges->Plays(learnt);
   return setup->of_light() ? Status() : ranges->Widen(setup->clips, setup->recorder.get());
 }
 

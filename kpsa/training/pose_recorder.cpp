@@ -331,7 +331,8 @@ Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
              [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
 }
 
-Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi) {
+Status PoseRecorder::VisitSignals(const TrainingClip& clip,
+                                  const std::function<void(std::span<const float>)>& visit) {
   KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
   Request request;
   for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
@@ -346,10 +347,7 @@ Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* 
     evaluator.Set(time, t);
     KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
     StoreSignals(evaluator, SpaceFromWorld(evaluator), 0, entries);
-    for (std::size_t e = 0; e < entries.size(); ++e) {
-      (*lo)[e] = std::min<double>((*lo)[e], entries[e]);
-      (*hi)[e] = std::max<double>((*hi)[e], entries[e]);
-    }
+    visit(entries);
   }
   return rig_.set_clip(std::nullopt);
 }

@@ -67,9 +67,8 @@ class PoseRecorder {
   // Poses that another one recorded, each into the row that is given for it.
   Status Replay(std::span<const RecordedPose* const> poses,
                 const std::function<std::span<float>(std::size_t)>& row);
-  // Widens the ranges [lo, hi] of all entries of the signals, in their order, by what they are at times of a
-  // clip; no points are evaluated.
-  Status WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi);
+  // All entries of the signals, in their order, at each time of a clip; no points are evaluated.
+  Status VisitSignals(const TrainingClip& clip, const std::function<void(std::span<const float>)>& visit);
   // The controls that would give the poses of the clips (ControlRange::shown), at rest where nothing shows
   // them.
   Result<ClipPoses> ControlsOfClips(const std::vector<TrainingClip>& clips);

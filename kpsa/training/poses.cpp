@@ -13,6 +13,7 @@ namespace {
 constexpr std::size_t kClipFrames = 80;  // frames of the clips to mix
 constexpr double kMoves = 0.01;          // of its range, that a control moves in the clips: it is not held
 constexpr std::size_t kHeldAtOnce = 8;
+constexpr std::size_t kLeastOfMany = 8;  // controls that are away from rest where many are
 // Of a mesh's weights, in the share of other controls that move together: shapes add up where they overlap
 constexpr double kWeightsTogether = 0.25;
 
@@ -85,6 +86,17 @@ class Sampler {
   void MoveToEnds(SampledPose* pose) {
     for (std::size_t i = 0; i < controls_.size(); ++i)
       pose->values[i] = random_.Unit() < 0.5 ? controls_[i].min : controls_[i].max;
+  }
+
+  // From eight up to all of them; the ends are where most of them add up.
+  void MoveManyAnywhere(bool to_ends, SampledPose* pose) {
+    const std::size_t n = controls_.size(), least = std::min(n, kLeastOfMany);
+    const auto more = static_cast<std::size_t>(random_.Unit() * static_cast<double>(n - least) + 0.5);
+    for (const std::size_t i : Some(n, least + more)) {
+      const ControlRange& c = controls_[i];
+      const double at = random_.Unit();
+      pose->values[i] = !to_ends ? c.min + (c.max - c.min) * at : at < 0.5 ? c.min : c.max;
+    }
   }
 
   // Controls of a clip that plays say nothing; whole numbers have no margin.
@@ -230,6 +242,14 @@ std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, 
   Sampler sampler(controls, {}, seed);
   std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
   for (SampledPose& pose : poses) sampler.MoveToEnds(&pose);
+  return poses;
+}
+
+std::vector<SampledPose> PosesWithMany(const std::vector<ControlRange>& controls, std::size_t count,
+                                       std::uint64_t seed) {
+  Sampler sampler(controls, {}, seed);
+  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
+  for (std::size_t p = 0; p < poses.size(); ++p) sampler.MoveManyAnywhere(p % 2 == 1, &poses[p]);
   return poses;
 }
 

@@ -69,6 +69,11 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
 std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed);
 
+// `count` poses with many controls away from rest, from eight up to all of them: anywhere in their ranges, and in every
+// second pose at their ends.
+std::vector<SampledPose> PosesWithMany(const std::vector<ControlRange>& controls, std::size_t count,
+                                       std::uint64_t seed);
+
 // The controls that no frame of the clips moves and no clip drives: those of deformers, above all. Without clips, none.
 std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses);
 

@@ -1,6 +1,7 @@
 #include "kpsa/training/trained_ranges.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "kpsa/training/signal_noise.h"
@@ -13,7 +14,9 @@ namespace {
 // `kHardlyMoved` in training has its guard fully there after `kStillRamp`, others after `kLeastRamp` at
 // least.
 constexpr double kSlackShare = 0.05, kHardlyMoved = 2, kStillRamp = 1, kLeastRamp = 0.25;
-constexpr double kStillTurn = 5e-4;     // of light: a turn (radians) of a joint that is none
+constexpr double kStillTurn = 5e-4;  // of light: a turn (radians) of a joint that is none
+constexpr std::array<double, 4> kParts = {0.0, 0.25, 0.5, 0.75};  // of a frame: clips are looked at there
+constexpr std::size_t kMostPlayed = 4096;
 constexpr double kTrainedBeyond = 0.5;  // of kBeyondShare: the rest of the way the guards come in
 
 }  // namespace
@@ -41,15 +44,30 @@ void RangeFinder::Widen(const RangeFinder& others) {
   }
 }
 
+void RangeFinder::Plays(const PoseMatrix& poses) {
+  Widen(poses);
+  for (std::size_t t = 0; t < poses.poses(); ++t) {
+    const std::span<const float> scalars = poses.row(t).subspan(layout_.scalar_begin());
+    played_->emplace_back(scalars.begin(), scalars.end());
+  }
+}
+
 Status RangeFinder::Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder) {
+  std::size_t frames = 0, frame = 0;
+  for (const TrainingClip& clip : clips) frames += clip.times.size();
+  const std::size_t apart = 1 + frames / kMostPlayed;
   for (const TrainingClip& clip : clips) {
     TrainingClip fine{clip.name, {}};
     for (std::size_t i = 0; i < clip.times.size(); ++i) {
       const double next = clip.times[std::min(i + 1, clip.times.size() - 1)];
-      for (const double part : {0.0, 0.25, 0.5, 0.75})
-        fine.times.push_back(clip.times[i] + part * (next - clip.times[i]));
+      for (const double part : kParts) fine.times.push_back(clip.times[i] + part * (next - clip.times[i]));
     }
-    KPSA_RETURN_IF_ERROR(recorder->WidenRanges(fine, &lo_, &hi_));
+    std::size_t time = 0;
+    KPSA_RETURN_IF_ERROR(recorder->VisitSignals(fine, [&](std::span<const float> entries) {
+      Widen(entries);
+      if (time++ % kParts.size() == 0 && frame++ % apart == 0)
+        played_->emplace_back(entries.begin(), entries.end());
+    }));
   }
   return Status();
 }
@@ -78,7 +96,13 @@ Result<std::vector<TrainedRange>> RangeFinder::Make(const TrainingRig& rig, Comp
         slack = !signal.matrix ? 0 : e < 9 ? kStillTurn : kLightShift;
         ramp = std::max(options.range_ramp * extent, slack);
       }
-      ranges.push_back(MakeTrainedRange(EntryName(signal, e), lo_[i], hi_[i], slack, ramp));
+      TrainedRange range = MakeTrainedRange(EntryName(signal, e), lo_[i], hi_[i], slack, ramp);
+      if (!options.rest.empty()) {
+        range.rest = options.rest[i];
+        const double went = std::max({hi_[i] - range.rest, range.rest - lo_[i], 0.0});
+        range.reach = went >= noticed ? went : 0;
+      }
+      ranges.push_back(std::move(range));
     }
   }
   return ranges;

@@ -2,6 +2,10 @@
 // guard comes in beyond. Internal to training.
 #pragma once
 
+#include <memory>
+#include <span>
+#include <vector>
+
 #include "kpsa/training/pose_recorder.h"
 
 namespace kpsa::engine {
@@ -14,13 +18,17 @@ class RangeFinder {
   void Widen(const PoseMatrix& poses);         // not centred
   void Widen(std::span<const float> scalars);  // of one pose, all of them
   void Widen(const RangeFinder& others);
+  void Plays(const PoseMatrix& poses);  // they are posed as such: played() has them
   // By the clips between their times: quaternion keys turn joints about axes there that no frame has.
   Status Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder);
+  // Of frames of the clips (of very many, some), and of what Plays was given: all scalars of each.
+  const std::vector<std::vector<float>>& played() const { return *played_; }
 
   struct Options {
     double tolerance = 0, range_ramp = 0;  // as TrainOptions
     double diagonal = 0;                   // of the model
     Matrix4 inverse_rest_stretch;
+    std::span<const float> rest = {};  // [scalars] at rest; empty: ranges have no reach
   };
   // Of the first signals of the layout, which have guards.
   Result<std::vector<TrainedRange>> Make(const TrainingRig& rig, Compiler* compiler,
@@ -29,6 +37,9 @@ class RangeFinder {
  private:
   PoseLayout layout_;
   std::vector<double> lo_, hi_;  // [scalars]; empty before the first pose
+  // Copies, which are made to be wider, have the same
+  std::shared_ptr<std::vector<std::vector<float>>> played_ =
+      std::make_shared<std::vector<std::vector<float>>>();
 };
 
 // Poses beyond the ranges of their controls, half as far beyond: training ends there, and on the other half

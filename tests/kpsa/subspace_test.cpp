@@ -178,6 +178,34 @@ TEST_P(SubspaceTest, PaperModeThatFellBackComesBack) {
   }
 }
 
+TEST_P(SubspaceTest, ALimitOfActivityComesBackWithWhatItCounts) {
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
+  EXPECT_TRUE(std::isinf(ReadSubspace(path_)->activity_limit)) << "none";
+  subspace_.activity_limit = 12.5;
+  subspace_.ranges[0].rest = 0.3, subspace_.ranges[0].reach = 0.7;
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
+  const Result<SafetensorsFile> file = SafetensorsFile::Read(path_);
+  ASSERT_TRUE(file.ok());
+  EXPECT_EQ(*file->Metadata("version"), std::to_string(kActivityVersion));
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->activity_limit, 12.5);
+  for (std::size_t i = 0; i < subspace_.ranges.size(); ++i) {
+    EXPECT_EQ(read->ranges[i].rest, subspace_.ranges[i].rest);
+    EXPECT_EQ(read->ranges[i].reach, subspace_.ranges[i].reach);
+  }
+  for (const double limit : {0.0, -1.0, std::nan("")}) {
+    Subspace damaged = subspace_;
+    damaged.activity_limit = limit;
+    EXPECT_FALSE(WriteSubspace(damaged, path_).ok()) << limit;
+  }
+  for (const double reach : {-1.0, std::nan("")}) {
+    Subspace damaged = subspace_;
+    damaged.ranges[1].reach = reach;
+    EXPECT_FALSE(WriteSubspace(damaged, path_).ok()) << reach;
+  }
+}
+
 TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
   const Result<Subspace> read = ReadSubspace(path_);
@@ -426,7 +454,7 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_EQ(message(header), "no error");
   EXPECT_NE(edited([](Json* j) {
               (*j)["__metadata__"]["version"] = "1";
-            }).find("format version 1, this program reads versions 3 to 13; train it again"),
+            }).find("format version 1, this program reads versions 3 to 14; train it again"),
             std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
             std::string::npos);

@@ -1,4 +1,3 @@
-#include "kpsa/training/tile_builder.h"
 #include "kpsa/training/tile_products.h"
 
 #include <gtest/gtest.h>
@@ -6,14 +5,15 @@
 #include <cmath>
 
 #include "base/simd.h"
+#include "kpsa/tiles.h"
 #include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/score_choice.h"
-#include "kpsa/tiles.h"
+#include "kpsa/training/tile_builder.h"
 
 namespace kpsa::engine {
 namespace {
 
-constexpr std::size_t kPoints = 300;
+constexpr std::size_t kPointsOfSheet = 300;
 constexpr Eigen::Index kInputs = 6;
 
 // Points that move with the inputs, and with products of them, in waves along their order.
@@ -45,24 +45,26 @@ class Bent {
   // The largest point error of a pose.
   double Error(const TileMap& map, const Eigen::VectorXd& y) const {
     const Eigen::VectorXf in = y.cast<float>();
-    PointBuffer out(kPoints);
+    PointBuffer out(kPointsOfSheet);
     map.Reconstruct({in.data(), static_cast<std::size_t>(kInputs)}, out.view());
     const std::vector<float> xyz = out.Interleaved();
     const Eigen::VectorXd error =
-        Eigen::Map<const Eigen::VectorXf>(xyz.data(), 3 * kPoints).cast<double>() - At(y);
-    return std::sqrt(
-        Eigen::Map<const Eigen::MatrixXd>(error.data(), 3, kPoints).colwise().squaredNorm().maxCoeff());
+        Eigen::Map<const Eigen::VectorXf>(xyz.data(), 3 * kPointsOfSheet).cast<double>() - At(y);
+    return std::sqrt(Eigen::Map<const Eigen::MatrixXd>(error.data(), 3, kPointsOfSheet)
+                         .colwise()
+                         .squaredNorm()
+                         .maxCoeff());
   }
 
  private:
   static PoseLayout Layout() {
     PoseLayout layout;
-    layout.points = kPoints;
+    layout.points = kPointsOfSheet;
     return layout;
   }
   static Eigen::MatrixXd Waves(Eigen::Index columns, std::uint64_t seed, double size) {
     const Eigen::MatrixXd random = RandomNormal(3, columns, seed);
-    Eigen::MatrixXd waves(3 * static_cast<Eigen::Index>(kPoints), columns);
+    Eigen::MatrixXd waves(3 * static_cast<Eigen::Index>(kPointsOfSheet), columns);
     for (Eigen::Index i = 0; i < waves.rows(); ++i) {
       for (Eigen::Index k = 0; k < columns; ++k)
         waves(i, k) =
@@ -188,7 +190,7 @@ TEST(TileProducts, EveryTargetGivesTheInputsOfTheNaiveTwin) {
     EXPECT_EQ(inputs, twin) << target;
     EXPECT_EQ(found.largest, std::sqrt(doubt)) << target;
     // Points from these inputs are those from y
-    PointBuffer a(kPoints), b(kPoints);
+    PointBuffer a(kPointsOfSheet), b(kPointsOfSheet);
     map.Reconstruct({y.data(), static_cast<std::size_t>(kInputs)}, a.view());
     const float* const from = inputs.data();
     const PointsView view = b.view();
