@@ -99,9 +99,8 @@ struct TrainedRange {
   double lo = 0, hi = 0;  // seen in training, or too near to it to matter
   double ramp = 0;  // from lo - ramp down and hi + ramp up nothing but the full evaluation is left, >= 0
   std::uint64_t patches = kAllPatches;  // that it speaks of, a bit each (kpsa/patches.h)
-  double rest = 0;                      // what it is at rest, and
-  double reach =
-      0;  // how far from there training went, or 0 where that hardly moved a point (kpsa/activity.h)
+  // What it is at rest, and how far from there training went, or 0 where that hardly moved a point (kpsa/activity.h)
+  double rest = 0, reach = 0;
   double per_reach() const { return reach > 0 ? 1 / reach : 0; }
 };
 // [min, max] widened on both sides by `slack` (what moves no point noticeably) and by rounding (1e-6 of the

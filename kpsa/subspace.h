@@ -122,8 +122,8 @@ struct Subspace {
   // and tiles read z = Q y.
   std::vector<float> latent;
   std::vector<TrainedRange> ranges;  // every varying plug upstream
-  double activity_limit =
-      std::numeric_limits<double>::infinity();  // kpsa/activity.h; infinite: none is needed
+  // Of what is out of rest at once (kpsa/activity.h); infinite: there is none
+  double activity_limit = std::numeric_limits<double>::infinity();
   bool of_light() const { return units == kLightUnits; }
   // Tiles have cues of their own, and their doubts alone judge: SoftCache's own score speaks of all points,
   // and would say of no part that it misses.
