@@ -1,5 +1,6 @@
 #!/bin/sh
-# Builds everything and runs all tests, and again under the address and undefined-behaviour sanitizers.
+# Builds everything and runs all tests, and those of the engine and of its readers again under the address and
+# undefined-behaviour sanitizers (tests/sanitize.sh has the rest).
 set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh
@@ -13,4 +14,4 @@ wait $others || echo "Blender, Chromium or shells could not be installed: their 
 ctest --test-dir build --output-on-failure -j "$(($(nproc) + 1))"
 # Tests within a process that said that they are skipped, and why
 awk '/: Skipped$/ {getline why} /^\[  SKIPPED \] .* ms\)$/ {print $4 " was skipped: " why}' build/Testing/Temporary/LastTest.log
-sh tests/sanitize.sh
+sh tests/sanitize.sh asan engine
