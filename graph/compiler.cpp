@@ -211,7 +211,14 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
 }
 
 Result<std::vector<Compiler::Stepped>> Compiler::Steps(const Graph& graph, const Request& request) {
-  return OrItsFailure([&] { return StepsOrThrow(graph, request); });
+  Result<Survey> survey = SurveyOf(graph, request, {});
+  if (!survey.ok()) return survey.status();
+  return std::move(survey->steps);
+}
+
+Result<Compiler::Survey> Compiler::SurveyOf(const Graph& graph, const Request& request,
+                                            const std::vector<PlugRef>& points) {
+  return OrItsFailure([&] { return SurveyOrThrow(graph, request, points); });
 }
 
 Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
@@ -269,44 +276,14 @@ Result<std::shared_ptr<const Plan>> Compiler::CompileOrThrow(const Graph& graph,
   return PlanBuilder(table, *draft, step_order, request, std::move(kernels)).Build();
 }
 
-Result<std::vector<Compiler::Stepped>> Compiler::StepsOrThrow(const Graph& graph, const Request& request) {
-  InstanceTable table(graph, request);
-  std::vector<Source> wanted;
-  KPSA_RETURN_IF_ERROR(ReachOutputs(graph, request, &table, &wanted));
-  StaticEvaluator statics(table);
-  const RestDigests digests(table, table.Order());
-  impl_->Share(table, statics, digests);
-  const Result<PlanDraft> draft = DraftPlan(table, statics, wanted, request);
-  if (!statics.status().ok()) return statics.status();
-  if (!draft.ok()) return draft.status();
-  impl_->rest.merge(impl_->RestOf(table, statics, digests));
-  std::map<Index, Stepped> nodes;
-  for (const DraftStep& step : draft->steps) {
-    if (step.instance == kNoIndex && step.inputs[0].kind == DraftInput::Kind::kStep)
-      continue;  // another's points
-    const NodeId node = step.instance != kNoIndex ? table.instances()[step.instance].node
-                                                  : table.varying()[step.inputs[0].varying].node;
-    Stepped& stepped = nodes[node.index];
-    stepped.node = node;
-    for (const auto& elements : step.sets.outputs) {
-      for (const PointSet& set : elements) stepped.points = stepped.points || set.total() > 0;
-    }
-  }
-  std::vector<Stepped> list;
-  for (const auto& [index, stepped] : nodes) list.push_back(stepped);
-  return list;
-}
+namespace {
 
-Result<Compiler::SplitPoints> Compiler::SplitOrThrow(const Graph& graph, const PlugRef& points) {
-  KPSA_RETURN_IF_ERROR(graph.CheckPlug(points));
+Result<Compiler::SplitPoints> SplitIn(InstanceTable& table, StaticEvaluator& statics, const PlugRef& points,
+                                      const Source& source) {
+  using SplitPoints = Compiler::SplitPoints;
+  const Graph& graph = table.graph();
   const NodeDef& def = graph.def(points.node);
-  if (!def.last_step) return SplitPoints();
-  Request request;
-  InstanceTable table(graph, request);
-  const Source source = table.Reach(points);
-  if (!table.status().ok()) return table.status();
-  const std::vector<Index> order = table.Order();
-  if (source.kind != Source::Kind::kInstance) return SplitPoints();
+  if (!def.last_step || source.kind != Source::Kind::kInstance) return SplitPoints();
   const Instance& instance = table.instances()[source.instance];
   if (instance.kind != Instance::Kind::kNode || instance.node != points.node) return SplitPoints();
   const ComputeGroup& group = table.group(instance);
@@ -325,14 +302,70 @@ Result<Compiler::SplitPoints> Compiler::SplitOrThrow(const Graph& graph, const P
     if (input.source.kind != Source::Kind::kValue) return SplitPoints();
   }
   if (split.in.attribute < 0) return SplitPoints();
-  StaticEvaluator statics(table);
-  const RestDigests digests(table, order);
-  impl_->Share(table, statics, digests);
   const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
   Result<std::shared_ptr<const LastStep>> step = def.last_step(view);
-  impl_->rest.merge(impl_->RestOf(table, statics, digests));
   if (!step.ok()) return step.status();
   split.step = std::move(*step);
+  return split;
+}
+
+}  // namespace
+
+Result<Compiler::Survey> Compiler::SurveyOrThrow(const Graph& graph, const Request& request,
+                                                 const std::vector<PlugRef>& points) {
+  InstanceTable table(graph, request);
+  std::vector<Source> wanted;
+  KPSA_RETURN_IF_ERROR(ReachOutputs(graph, request, &table, &wanted));
+  std::vector<Source> sources(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].attribute < 0) continue;
+    KPSA_RETURN_IF_ERROR(graph.CheckPlug(points[i]));
+    sources[i] = table.Reach(points[i]);
+  }
+  if (!table.status().ok()) return table.status();
+  StaticEvaluator statics(table);
+  const RestDigests digests(table, table.Order());
+  impl_->Share(table, statics, digests);
+  const Result<PlanDraft> draft = DraftPlan(table, statics, wanted, request);
+  if (!statics.status().ok()) return statics.status();
+  if (!draft.ok()) return draft.status();
+  Survey survey;
+  survey.split.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].attribute < 0) continue;
+    Result<SplitPoints> split = SplitIn(table, statics, points[i], sources[i]);
+    if (!split.ok()) return split.status();
+    survey.split[i] = std::move(*split);
+  }
+  impl_->rest.merge(impl_->RestOf(table, statics, digests));
+  std::map<Index, Stepped> nodes;
+  for (const DraftStep& step : draft->steps) {
+    if (step.instance == kNoIndex && step.inputs[0].kind == DraftInput::Kind::kStep)
+      continue;  // another's points
+    const NodeId node = step.instance != kNoIndex ? table.instances()[step.instance].node
+                                                  : table.varying()[step.inputs[0].varying].node;
+    Stepped& stepped = nodes[node.index];
+    stepped.node = node;
+    for (const auto& elements : step.sets.outputs) {
+      for (const PointSet& set : elements) stepped.points = stepped.points || set.total() > 0;
+    }
+  }
+  for (const auto& [index, stepped] : nodes) survey.steps.push_back(stepped);
+  return survey;
+}
+
+Result<Compiler::SplitPoints> Compiler::SplitOrThrow(const Graph& graph, const PlugRef& points) {
+  KPSA_RETURN_IF_ERROR(graph.CheckPlug(points));
+  if (!graph.def(points.node).last_step) return SplitPoints();
+  Request request;
+  InstanceTable table(graph, request);
+  const Source source = table.Reach(points);
+  if (!table.status().ok()) return table.status();
+  StaticEvaluator statics(table);
+  const RestDigests digests(table, table.Order());
+  impl_->Share(table, statics, digests);
+  Result<SplitPoints> split = SplitIn(table, statics, points, source);
+  impl_->rest.merge(impl_->RestOf(table, statics, digests));
   return split;
 }
 

@@ -49,10 +49,18 @@ class Compiler {
   // Of all nodes, without repetition, which is what Compile does before it binds. Errors: those of Compile that are
   // found by then.
   Result<std::vector<Stepped>> Steps(const Graph& graph, const Request& request);
+  // Steps, and Split of each of these points, of which the request has what comes into them: cheaper than one after the
+  // other. A plug without an attribute (-1) is not split.
+  struct Survey {
+    std::vector<Stepped> steps;
+    std::vector<SplitPoints> split;
+  };
+  Result<Survey> SurveyOf(const Graph& graph, const Request& request, const std::vector<PlugRef>& points);
 
  private:
   Result<std::shared_ptr<const Plan>> CompileOrThrow(const Graph& graph, const Request& request);
-  Result<std::vector<Stepped>> StepsOrThrow(const Graph& graph, const Request& request);
+  Result<Survey> SurveyOrThrow(const Graph& graph, const Request& request,
+                               const std::vector<PlugRef>& points);
   Result<SplitPoints> SplitOrThrow(const Graph& graph, const PlugRef& points);
   Result<Value> RestOrThrow(const Graph& graph, const PlugRef& plug);
   struct Impl;

@@ -141,9 +141,26 @@ std::vector<PlugRef> MatricesRead(const Graph& graph, const AccelerationTarget& 
   return plugs;
 }
 
+bool NeedsSteps(const Subspace& subspace) { return subspace.of_inner() || !subspace.mends.empty(); }
+
+// Of each mesh, the points that may have a last step which no control reaches; without an attribute (-1): none.
+std::vector<PlugRef> SplittablePoints(const Graph& graph, const AccelerationTarget& target) {
+  std::vector<PlugRef> splittable(target.meshes.size());
+  for (std::size_t m = 0; m < splittable.size() && !target.colors; ++m) {
+    const PlugRef& points = target.meshes[m].stages.back().points;
+    const auto varies = [&](const PlugRef& plug) {
+      return plug.node == points.node && graph.PlugType(plug) != Type::kMatrix;
+    };
+    if (std::ranges::any_of(target.varying, varies) || std::ranges::any_of(target.controls, varies)) continue;
+    splittable[m] = points;
+  }
+  return splittable;
+}
+
 // Guards of what varies or is set here: with its trained range, or, if it never moved there, its rest value.
 Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
-                 const Subspace& subspace, const std::vector<SetHere>& set_here, AccelerationDraft* draft) {
+                 const Subspace& subspace, const std::vector<SetHere>& set_here, AccelerationDraft* draft,
+                 std::vector<Compiler::SplitPoints>* split) {
   KpsaConfig::Data& data = draft->data;
   RangesByPlug ranges;
   for (const TrainedRange& range : subspace.ranges) ranges.emplace(range.plug, &range);
@@ -151,8 +168,15 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
   std::vector<std::string> unguarded;
   std::vector<PlugRef> plugs = target.outputs();
   for (const PlugRef& plug : MatricesRead(graph, target, subspace)) plugs.push_back(plug);
+  Request request;
+  for (const PlugRef& plug : plugs) request.outputs.push_back({plug, {}});
+  request.varying = varying;
+  Result<Compiler::Survey> survey = compiler->SurveyOf(
+      graph, request, NeedsSteps(subspace) ? SplittablePoints(graph, target) : std::vector<PlugRef>());
+  if (!survey.ok()) return survey.status();
+  *split = std::move(survey->split);
   Result<std::vector<Signal>> signals =
-      FindSignals(graph, compiler, plugs, varying, CarriedNodes(graph, target, subspace), &unguarded);
+      FindSignals(graph, survey->steps, varying, CarriedNodes(graph, target, subspace), &unguarded);
   if (!signals.ok()) return signals.status();
   if (!unguarded.empty()) draft->AlwaysMiss(unguarded[0] + " varies and cannot be guarded");
   const bool limited = std::isfinite(subspace.activity_limit);
@@ -345,26 +369,28 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
 std::string StretchedName(const Graph& graph, Compiler* compiler, const AccelerationTarget& target) {
   if (target.space.empty()) return "the space";
   std::string varying;
+  std::vector<NodeId> nodes;
+  Request request;
   for (const NodeId node : ParentsFrom(graph, target.space[0].node)) {
     const int scale = graph.def(node).FindAttribute("scale"),
               matrix = graph.def(node).FindAttribute("matrix");
     if (scale < 0 || matrix < 0) continue;
-    const PlugRef plug{node, matrix, -1, -1};
-    const Result<Value> rest = compiler->Rest(graph, plug);
-    Request request;
-    request.outputs.push_back({plug, {}});
-    const auto plan =
-        Compiler().Compile(graph, request);  // the other one keeps kernels of the last compilation
-    if (rest.ok() && plan.ok()) {
-      Evaluator evaluator(*plan);
-      if (evaluator.Evaluate().ok()) {
-        const SpaceFrame frame =
-            SpaceFrameOf(evaluator.Get<Matrix4>(0), InverseRestStretch(rest->get<Matrix4>()));
-        if (frame.stretch > 1e-6 || frame.scale != 1) return graph.name(node);
-      }
-    }
+    nodes.push_back(node);
+    request.outputs.push_back({{node, matrix, -1, -1}, {}});
     for (const PlugRef& v : target.varying) {
       if (v.node == node && v.attribute == scale) varying = graph.name(node);
+    }
+  }
+  // As they are now, by a compiler of its own: the other one keeps kernels of the last compilation
+  if (const auto plan = Compiler().Compile(graph, request); plan.ok()) {
+    Evaluator evaluator(*plan);
+    const bool is_good = evaluator.Evaluate().ok();
+    for (std::size_t i = 0; i < nodes.size() && is_good; ++i) {
+      const Result<Value> rest = compiler->Rest(graph, request.outputs[i].plug);
+      if (!rest.ok()) continue;
+      const SpaceFrame frame =
+          SpaceFrameOf(evaluator.Get<Matrix4>(i), InverseRestStretch(rest->get<Matrix4>()));
+      if (frame.stretch > 1e-6 || frame.scale != 1) return graph.name(nodes[i]);
     }
   }
   return varying.empty() ? graph.name(target.space[0].node) : varying;
@@ -389,16 +415,13 @@ Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTa
 }
 
 // What gives the points from inner ones, where the subspace reconstructs these.
-Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
-                 AccelerationDraft* draft) {
+Status FindSteps(const std::vector<Compiler::SplitPoints>& split, AccelerationDraft* draft) {
   const Subspace& subspace = *draft->data.subspace;
-  if ((!subspace.of_inner() && subspace.mends.empty()) || draft->data.always_miss) return Status();
-  Result<std::vector<Compiler::SplitPoints>> split = SplitMeshes(graph, compiler, target);
-  if (!split.ok()) return split.status();
+  if (!NeedsSteps(subspace) || draft->data.always_miss) return Status();
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
     const SubspaceOutput& output = subspace.outputs[m];
     std::shared_ptr<const LastStep>& step = draft->data.steps.emplace_back();
-    const std::shared_ptr<const LastStep>& here = (*split)[m].step;
+    const std::shared_ptr<const LastStep>& here = split[m].step;
     // What it has besides points may vary here: points come out as calibration had them
     if (here == nullptr) {
       if (output.inner > 0)
@@ -410,7 +433,7 @@ Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarge
       if (mend.output != m) continue;
       step = here;
       if (here->points() != output.points ||
-          here->Bind(PointSet::Of(mend.points, static_cast<Index>(output.points)))->inner() != mend.inner)
+          here->InnerOf(PointSet::Of(mend.points, static_cast<Index>(output.points))) != mend.inner)
         return Status::Invalid(
             "the subspace mends points of {} by a last step that the rig lacks; train it again", output.name);
     }
@@ -430,16 +453,13 @@ Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarge
 
 Result<std::vector<Compiler::SplitPoints>> SplitMeshes(const Graph& graph, Compiler* compiler,
                                                        const AccelerationTarget& target) {
-  std::vector<Compiler::SplitPoints> split(target.meshes.size());
-  for (std::size_t m = 0; m < split.size() && !target.colors; ++m) {
-    const PlugRef& points = target.meshes[m].stages.back().points;
-    const auto varies = [&](const PlugRef& plug) {
-      return plug.node == points.node && graph.PlugType(plug) != Type::kMatrix;
-    };
-    if (std::ranges::any_of(target.varying, varies) || std::ranges::any_of(target.controls, varies)) continue;
+  std::vector<Compiler::SplitPoints> split;
+  for (const PlugRef& points : SplittablePoints(graph, target)) {
+    split.emplace_back();
+    if (points.attribute < 0) continue;
     Result<Compiler::SplitPoints> one = compiler->Split(graph, points);
     if (!one.ok()) return one.status();
-    split[m] = std::move(*one);
+    split.back() = std::move(*one);
   }
   return split;
 }
@@ -452,11 +472,12 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   draft.data.subspace = subspace;
   std::vector<SetHere> set_here;
   KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, options, &draft, &set_here));
-  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, set_here, &draft));
+  std::vector<Compiler::SplitPoints> split;
+  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, set_here, &draft, &split));
   KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
   for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
     draft.data.outputs_in_space.push_back(mesh.stages.back().world);
-  KPSA_RETURN_IF_ERROR(FindSteps(graph, compiler, target, &draft));
+  KPSA_RETURN_IF_ERROR(FindSteps(split, &draft));
   for (const Signal& signal : draft.matrices) draft.data.relative.push_back(signal.relative);
   for (const auto* list : {&draft.matrices, &draft.scalars}) {
     for (const Signal& signal : *list) draft.data.guard_names.push_back(signal.name);

@@ -10,18 +10,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   hasher.AddLong(std::span<const double>(s.cue_mean));
   hasher.AddLong(std::span<const float>(s.soft_cache.factor.span()));
   hasher.AddLong(std::span<const float>(s.latent));
-  for (const TileMap& tiles : s.tiles) {
-    hasher.AddLong(std::span<const std::uint8_t>(tiles.data().u.span()));
-    hasher.AddLong(std::span<const std::uint16_t>(tiles.data().v.span()));
-    hasher.AddLong(std::span<const float>(tiles.data().scale.span()));
-    hasher.AddLong(std::span<const std::uint32_t>(tiles.data().columns));
-    hasher.AddLong(std::span<const float>(tiles.data().mean.span()));
-    hasher.AddLong(std::span<const std::uint8_t>(tiles.data().pairs));
-    hasher.AddLong(std::span<const std::uint16_t>(tiles.data().w.span()));
-    hasher.AddLong(std::span<const std::uint16_t>(tiles.data().doubt.span()));
-    hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joints));
-    hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joint_rows));
-  }
+  for (const TileMap& tiles : s.tiles) hasher.Add(tiles.digest());
   for (const SubspaceOutput& output : s.outputs) {
     hasher.Add(output.inner);
     hasher.AddLong(std::span<const Index>(output.stepped));
@@ -66,13 +55,17 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.AddLong(std::span<const double>(*range));
   for (const auto* patches : {&data_.matrix_patches, &data_.scalar_patches})
     hasher.AddLong(std::span<const std::uint64_t>(*patches));
+  std::size_t numbers = 0;
+  for (const CalibrationPair& pair : s.calibration) numbers += 6 + 3 * pair.patches.size();
   std::vector<double> calibration;
+  calibration.reserve(numbers);
   for (const CalibrationPair& pair : s.calibration) {
-    calibration.insert(calibration.end(),
-                       {pair.score, pair.error, pair.guard, pair.middle, static_cast<double>(pair.kind),
-                        static_cast<double>(pair.patches.size())});
-    for (const PatchPair& patch : pair.patches)
-      calibration.insert(calibration.end(), {patch.score, patch.error, patch.guard});
+    for (const double number : {pair.score, pair.error, pair.guard, pair.middle,
+                                static_cast<double>(pair.kind), static_cast<double>(pair.patches.size())})
+      calibration.push_back(number);
+    for (const PatchPair& patch : pair.patches) {
+      for (const double number : {patch.score, patch.error, patch.guard}) calibration.push_back(number);
+    }
   }
   hasher.AddLong(std::span<const double>(calibration));
   hasher.Add(s.patches.tiles);

@@ -73,8 +73,8 @@ class PartialStep final : public LastStep {
       : step_(std::move(step)), stepped_(PointsOfTiles(tiles, step_->points())) {
     KPSA_CHECK(!stepped_.empty());
     const auto total = static_cast<Index>(step_->points());
-    const std::unique_ptr<const Bound> bound = step_->Bind(PointSet::Of(stepped_, total));
-    std::ranges::set_difference(bound->inner(), stepped_, std::back_inserter(others_));
+    const std::vector<Index> inner = step_->InnerOf(PointSet::Of(stepped_, total));
+    std::ranges::set_difference(inner, stepped_, std::back_inserter(others_));
   }
   std::size_t points() const override { return step_->points(); }
   std::size_t inner_points() const override { return step_->points() + others_.size(); }

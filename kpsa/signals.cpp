@@ -102,9 +102,15 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
   request.varying = varying;
   const auto steps = compiler->Steps(graph, request);
   if (!steps.ok()) return steps.status();
+  return FindSignals(graph, *steps, varying, carried, unguarded);
+}
+
+Result<std::vector<Signal>> FindSignals(const Graph& graph, const std::vector<Compiler::Stepped>& steps,
+                                        const std::vector<PlugRef>& varying, const std::set<Index>& carried,
+                                        std::vector<std::string>* unguarded) {
   // Nodes that have a varying step, and whether one of them has points
   std::map<Index, bool> nodes;
-  for (const Compiler::Stepped& stepped : *steps) {
+  for (const Compiler::Stepped& stepped : steps) {
     if (graph.def(stepped.node).stateful) {
       return Status::Invalid(
           "\"{}\" remembers its previous frame, and a subspace knows poses only: points after it cannot be "
@@ -117,15 +123,20 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
   for (const PlugRef& plug : varying) varying_nodes.insert(plug.node.index);
 
   std::map<std::string, Signal> signals;
+  const auto name = [&](const PlugRef& plug, bool is_matrix) {
+    std::string known = graph.PlugName(plug);
+    const auto [place, is_new] = signals.try_emplace(std::move(known));
+    if (is_new) place->second = Signal{place->first, plug, is_matrix};
+  };
   const auto add = [&](const PlugRef& plug, Type type) {
     if (type == Type::kDouble3 || type == Type::kQuaternion) {
       for (int c = 0; c < (type == Type::kDouble3 ? 3 : 4); ++c) {
         PlugRef child = plug;
         child.component = c;
-        signals.emplace(graph.PlugName(child), Signal{graph.PlugName(child), child, false});
+        name(child, false);
       }
     } else if (IsSmallType(type) && type != Type::kMatrix) {
-      signals.emplace(graph.PlugName(plug), Signal{graph.PlugName(plug), plug, false});
+      name(plug, false);
     } else if (IsPointType(type) && unguarded != nullptr && varying_nodes.count(plug.node.index) != 0) {
       unguarded->push_back(graph.PlugName(plug));
     }
@@ -134,15 +145,14 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
   const auto add_matrix = [&](const PlugRef& source) {
     if (IsTransform(graph.def(source.node)) || graph.PlugType(source) != Type::kMatrix) return;
     if (nodes.count(source.node.index) == 0 && varying_nodes.count(source.node.index) == 0) return;
-    signals.emplace(graph.PlugName(source), Signal{graph.PlugName(source), source, true});
+    name(source, true);
   };
   for (const auto& [index, has_points] : nodes) {
     const NodeId node = graph.IdAt(index);
     const NodeDef& def = graph.def(node);
     if (IsTransform(def) && !has_points) {
       if (carried.count(index) != 0) continue;
-      const PlugRef plug{node, def.FindAttribute("matrix"), -1, -1};
-      signals.emplace(graph.PlugName(plug), Signal{graph.PlugName(plug), plug, true});
+      name({node, def.FindAttribute("matrix"), -1, -1}, true);
       // A parent that is no transform has no local matrix of its own
       const PlugRef parent{node, def.FindAttribute("parentMatrix"), -1, -1};
       if (const Connection* c = graph.FindConnection(parent)) add_matrix(c->source);
@@ -172,7 +182,7 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
     }
   }
   std::vector<Signal> sorted;
-  for (auto& [name, signal] : signals) sorted.push_back(std::move(signal));
+  for (auto& [known, signal] : signals) sorted.push_back(std::move(signal));
   return sorted;
 }
 

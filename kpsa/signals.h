@@ -56,5 +56,9 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
                                         const std::vector<PlugRef>& outputs,
                                         const std::vector<PlugRef>& varying, const std::set<Index>& carried,
                                         std::vector<std::string>* unguarded);
+// The same of steps that Compiler::Steps gave of these outputs.
+Result<std::vector<Signal>> FindSignals(const Graph& graph, const std::vector<Compiler::Stepped>& steps,
+                                        const std::vector<PlugRef>& varying, const std::set<Index>& carried,
+                                        std::vector<std::string>* unguarded);
 
 }  // namespace kpsa::engine

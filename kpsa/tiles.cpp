@@ -225,8 +225,9 @@ std::size_t Groups(std::size_t rank, std::size_t wide) { return (rank + wide + 3
 
 }  // namespace
 
-Result<TileMap> TileMap::Make(TileData data, const std::string& what) {
+Result<TileMap> TileMap::Make(TileData data, const std::string& what, const std::optional<Digest>& known) {
   TileMap map;
+  map.known_digest_ = known;
   const std::size_t tiles = (data.points + kTilePoints - 1) / kTilePoints;
   if (data.components != 1 && data.components != 3)
     return Status::Invalid("{}: {} components, expected 1 or 3", what, data.components);
@@ -392,9 +393,31 @@ bool TileMap::JointOf(std::size_t tile, const float* y, Matrix4* joint) const {
   return true;
 }
 
+Digest TileMap::digest() const {
+  if (known_digest_.has_value()) return *known_digest_;
+  Hasher hasher;
+  hasher.AddLong(std::span<const std::uint8_t>(data_.u.span()));
+  hasher.AddLong(std::span<const std::uint16_t>(data_.v.span()));
+  hasher.AddLong(std::span<const float>(data_.scale.span()));
+  hasher.AddLong(std::span<const std::uint32_t>(data_.columns));
+  hasher.AddLong(std::span<const float>(data_.mean.span()));
+  hasher.AddLong(std::span<const std::uint8_t>(data_.pairs));
+  hasher.AddLong(std::span<const float>(data_.whitening.span()));
+  hasher.AddLong(std::span<const std::uint16_t>(data_.w.span()));
+  hasher.AddLong(std::span<const std::uint16_t>(data_.doubt.span()));
+  for (const auto* list :
+       {&data_.ranks, &data_.wide, &data_.counts, &data_.products, &data_.joints, &data_.joint_rows})
+    hasher.AddLong(std::span<const std::uint32_t>(*list));
+  hasher.AddLong(std::span<const std::uint8_t>(data_.direct));
+  for (const auto* list : {&data_.joint_mean, &data_.joint_deviation})
+    hasher.AddLong(std::span<const double>(*list));
+  return hasher.Finish();
+}
+
 TileMap TileMap::WithDoubts(std::span<const double> factors) const {
   KPSA_CHECK_EQ(factors.size(), tiles());
   TileMap result = *this;
+  result.known_digest_.reset();
   for (std::size_t t = 0; t < tiles(); ++t) {
     if (products(t) == 0) continue;
     float* scales = result.data_.whitening.data() + product_begin_[t].whitening + 16;

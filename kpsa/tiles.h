@@ -33,10 +33,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/digest.h"
 #include "base/points.h"
 #include "base/status.h"
 #include "base/types.h"
@@ -98,10 +100,13 @@ struct TileTerms;  // kpsa/tile_inputs.h
 class TileMap {
  public:
   TileMap() = default;
-  // Checks all sizes, ranks and columns; errors name `what`.
-  static Result<TileMap> Make(TileData data, const std::string& what);
+  // Checks all sizes, ranks and columns; errors name `what`. known: a digest that stands for the data, where one is known.
+  static Result<TileMap> Make(TileData data, const std::string& what,
+                              const std::optional<Digest>& known = std::nullopt);
 
   const TileData& data() const { return data_; }
+  // Maps of the same digest are the same; those of a file and of what it was written from have others.
+  Digest digest() const;
   std::size_t points() const { return data_.points; }
   std::size_t inputs() const { return data_.inputs; }
   std::size_t tiles() const { return data_.ranks.size(); }
@@ -150,6 +155,7 @@ class TileMap {
            std::span<const Index> tiles, std::span<const Matrix4> spaces) const;
 
   TileData data_;
+  std::optional<Digest> known_digest_;
   std::vector<std::size_t> column_begin_;  // [tiles] first of columns
   std::vector<std::size_t> scale_begin_;   // [tiles] first of scale
   std::vector<std::size_t> v_begin_;       // [tiles] first half of V

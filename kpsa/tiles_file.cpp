@@ -35,8 +35,15 @@ void AddTiles(const Subspace& s, SafetensorsWriter* writer) {
   }
 }
 
-Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
+Status ReadTiles(const SafetensorsFile& file, const std::string& file_digest, Subspace* s) {
   constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
+  const auto known = [&](std::size_t map) -> std::optional<Digest> {
+    if (file_digest.empty()) return std::nullopt;
+    Hasher hasher;
+    hasher.Add(std::string_view(file_digest));
+    hasher.Add(static_cast<std::uint64_t>(map));
+    return hasher.Finish();
+  };
   for (std::size_t i = 0; i < s->outputs.size(); ++i) {
     const std::string prefix = fmt::format("tiles.{}.", i);
     TileData data;
@@ -67,7 +74,7 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
       KPSA_RETURN_IF_ERROR(
           Assign(file.Values<double>(prefix + "jointDeviation", {kAny}), &data.joint_deviation));
     }
-    Result<TileMap> map = TileMap::Make(std::move(data), "tiles of \"" + s->outputs[i].name + "\"");
+    Result<TileMap> map = TileMap::Make(std::move(data), "tiles of \"" + s->outputs[i].name + "\"", known(i));
     if (!map.ok()) return map.status();
     s->tiles.push_back(std::move(*map));
   }

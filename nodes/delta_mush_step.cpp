@@ -37,6 +37,7 @@ class MushStep final : public LastStep {
   std::unique_ptr<const Bound> Bind(const PointSet& out) const override {
     return std::make_unique<MushPart>(step_.Bind(out.ToVector()));
   }
+  std::vector<Index> InnerOf(const PointSet& out) const override { return step_.InnerOf(out.ToVector()); }
 
  private:
   Value mesh_;  // keeps the topology

@@ -179,7 +179,7 @@ class Mender {
   TileMend Fit(Index output, Index tile, std::vector<Index> of, double ridge, bool all) const {
     const TileMap& tiles = subspace_.tiles[output];
     TileMend mend{output, tile, std::move(of), {}, {}, {}};
-    mend.inner = step_.Bind(PointSet::Of(mend.points, static_cast<Index>(step_.points())))->inner();
+    mend.inner = step_.InnerOf(PointSet::Of(mend.points, static_cast<Index>(step_.points())));
     const auto cues = tiles.CuesOf(tile);
     const auto n = static_cast<Eigen::Index>(mend.inner.size()), j = static_cast<Eigen::Index>(cues.size());
     std::vector<std::size_t> poses;

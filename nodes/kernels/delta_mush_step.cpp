@@ -38,22 +38,24 @@ DeltaMushStep::DeltaMushStep(const Topology& topology, ConstPointsView rest,
       smoothed_(rest.count, false) {
   if (masks_.empty()) masks_.assign(rest.count, 1.0f);
   KPSA_CHECK_EQ(masks_.size(), rest.count);
-  const auto smooths = [&](Index p) { return settings.iterations > 0 && Smooths(topology, settings, p); };
+  std::vector<std::uint8_t> smooths(points());  // quicker than bits
+  for (Index p = 0; p < points(); ++p) smooths[p] = settings.iterations > 0 && Smooths(topology, settings, p);
   for (Index p = 0; p < points(); ++p) {
-    if (envelope_ * masks_[p] == 0 || !smooths(p)) masks_[p] = 0;
+    if (envelope_ * masks_[p] == 0 || !smooths[p]) masks_[p] = 0;
     if (!Changes(p)) continue;
     changes_ = true;
     smoothed_[p] = true;
-    for (Index q : topology.neighbors().row(p)) smoothed_[q] = smooths(q);
+    for (Index q : topology.neighbors().row(p)) smoothed_[q] = smooths[q];
   }
   for (Index p = 0; p < points(); ++p) {
-    if (!smoothed_[p] || envelope_ * masks_[p] == 1) continue;
+    if (smoothed_[p] == 0 || envelope_ * masks_[p] == 1) continue;
     in_rows_[p] = static_cast<Index>(inner_points());
     extra_.push_back(p);
   }
   rest_ = PointBuffer(inner_points());
-  for (std::size_t i = 0; i < inner_points(); ++i)
-    CopyPoint(rest, i < points() ? i : extra_[i - points()], rest_.view(), i);
+  const PointsView own = rest_.view();
+  CopyPoints(rest, {own.x, own.y, own.z, points()});
+  for (std::size_t k = 0; k < extra_.size(); ++k) CopyPoint(rest, extra_[k], own, points() + k);
 }
 
 const DeltaMushStep::Whole& DeltaMushStep::whole() const {
@@ -78,7 +80,7 @@ void DeltaMushStep::Inner(const DeltaMushKernel& smoothing, ConstPointsView in, 
   smoothing.Run({.envelope = 1, .displacement = 0, .pivot = MiddleOf(in)}, in,
                 {inner.x, inner.y, inner.z, points()}, scratch.span());
   for (std::size_t i = 0; i < points(); ++i) {
-    if (!smoothed_[i]) CopyPoint(in, i, inner, i);
+    if (smoothed_[i] == 0) CopyPoint(in, i, inner, i);
   }
   for (std::size_t k = 0; k < extra_.size(); ++k) CopyPoint(in, extra_[k], inner, points() + k);
 }
@@ -86,7 +88,7 @@ void DeltaMushStep::Inner(const DeltaMushKernel& smoothing, ConstPointsView in, 
 PointBuffer DeltaMushStep::InnerRest(std::span<const Index> of) const {
   if (of.size() > points() / kFew) return whole().rest;
   std::vector<Index> smoothed;
-  std::ranges::copy_if(of, std::back_inserter(smoothed), [&](Index p) { return smoothed_[p]; });
+  std::ranges::copy_if(of, std::back_inserter(smoothed), [&](Index p) { return smoothed_[p] != 0; });
   const std::vector<Index> needed = DeltaMushDemand(*topology_, settings_, smoothed);
   const DeltaMushKernel smoothing(*topology_, rest(), settings_, smoothed, needed, {}, MiddleOf(rest()));
   PointBuffer in(needed.size()), out(smoothed.size());
@@ -99,31 +101,46 @@ PointBuffer DeltaMushStep::InnerRest(std::span<const Index> of) const {
   return inner;
 }
 
-DeltaMushStep::Part DeltaMushStep::Bind(std::span<const Index> out_points) const {
-  KPSA_CHECK(IsSortedSet(out_points, points()));
-  Part part;
-  part.inputs_ = {envelope_, displacement_, {}};
+std::vector<bool> DeltaMushStep::ReadByFrames(std::span<const Index> out_points) const {
   std::vector<bool> read(inner_points(), false);
-  MushFrames::Outputs outputs{out_points, {}, {}};
   for (Index p : out_points) {
-    outputs.in.push_back(in_rows_[p]);
-    outputs.masks.push_back(masks_[p]);
     if (!Changes(p)) continue;
     read[p] = true;
     for (Index q : topology_->neighbors().row(p)) read[q] = true;
   }
+  return read;
+}
+
+std::vector<Index> DeltaMushStep::InnerOf(std::span<const Index> out_points) const {
+  KPSA_CHECK(IsSortedSet(out_points, points()));
+  std::vector<bool> read = ReadByFrames(out_points);
+  for (Index p : out_points) read[in_rows_[p]] = true;
+  std::vector<Index> inner;
+  for (Index i = 0; i < inner_points(); ++i) {
+    if (read[i]) inner.push_back(i);
+  }
+  return inner;
+}
+
+DeltaMushStep::Part DeltaMushStep::Bind(std::span<const Index> out_points) const {
+  KPSA_CHECK(IsSortedSet(out_points, points()));
+  Part part;
+  part.inputs_ = {envelope_, displacement_, {}};
+  MushFrames::Outputs outputs{out_points, {}, {}};
+  for (Index p : out_points) {
+    outputs.in.push_back(in_rows_[p]);
+    outputs.masks.push_back(masks_[p]);
+  }
   if (CountsUp(outputs.in)) outputs.in.clear();
   if (std::ranges::all_of(outputs.masks, [](float w) { return w == 1; })) outputs.masks.clear();
+  const std::vector<bool> read = ReadByFrames(out_points);
   std::vector<Index> local_of(points(), kNoIndex);
   for (Index p = 0; p < points(); ++p) {
     if (!read[p]) continue;
     local_of[p] = static_cast<Index>(part.source_.size());
     part.source_.push_back(p);
   }
-  for (Index p : out_points) read[in_rows_[p]] = true;
-  for (Index i = 0; i < inner_points(); ++i) {
-    if (read[i]) part.inner_.push_back(i);
-  }
+  part.inner_ = InnerOf(out_points);
   part.local_count_ = part.source_.size();
   const PointBuffer inner_rest = InnerRest(part.source_);
   if (CountsUp(part.source_)) part.source_.clear();

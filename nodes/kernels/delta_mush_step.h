@@ -51,8 +51,9 @@ class DeltaMushStep {
   std::size_t points() const { return in_rows_.size(); }
   std::size_t inner_points() const { return points() + extra_.size(); }
   Index PointOf(Index inner) const { return inner < points() ? inner : extra_[inner - points()]; }
-  void Inner(ConstPointsView in, PointsView inner) const;  // two buffers
-  Part Bind(std::span<const Index> out_points) const;      // sorted
+  void Inner(ConstPointsView in, PointsView inner) const;               // two buffers
+  Part Bind(std::span<const Index> out_points) const;                   // sorted
+  std::vector<Index> InnerOf(std::span<const Index> out_points) const;  // Bind(out_points).inner()
 
  private:
   bool Changes(Index point) const { return masks_[point] != 0; }
@@ -66,6 +67,8 @@ class DeltaMushStep {
   const Whole& whole() const;
   void Inner(const DeltaMushKernel& smoothing, ConstPointsView in, PointsView inner) const;
   ConstPointsView rest() const { return {rest_.view().x, rest_.view().y, rest_.view().z, points()}; }
+  // What the frames of outputs read: themselves and their neighbours, where anything changes.
+  std::vector<bool> ReadByFrames(std::span<const Index> out_points) const;
   // Inner points of the rest shape, at least those of the list, sorted.
   PointBuffer InnerRest(std::span<const Index> of) const;
 
@@ -75,9 +78,9 @@ class DeltaMushStep {
   float envelope_, displacement_;
   bool changes_ = false;
   // [points()]
-  std::vector<float> masks_;    // 0 where nothing changes
-  std::vector<Index> in_rows_;  // the row of a point as it came in; any where no output reads that
-  std::vector<bool> smoothed_;  // whether row i is smoothed
+  std::vector<float> masks_;            // 0 where nothing changes
+  std::vector<Index> in_rows_;          // the row of a point as it came in; any where no output reads that
+  std::vector<std::uint8_t> smoothed_;  // whether row i is smoothed
   // [inner_points()], and of the rows after points()
   PointBuffer rest_;          // as they come in
   std::vector<Index> extra_;  // whose they are

@@ -291,5 +291,35 @@ TEST(SubspaceVersions, HeadersDoNotGrowWithTheLists) {
   EXPECT_GT(header_of(kMany, list_of(kMany)), header_of(kFew, list_of(kFew)) + kDigits) << "it would be seen";
 }
 
+// What stands for the tiles where kernels are looked up: of a file its digest, else what is in them.
+TEST(TileDigests, TellMapsApart) {
+  const TemporaryFolder folder;
+  const auto read = [&](const Subspace& written) {
+    const std::string path = folder / "one.kpsa";
+    EXPECT_TRUE(WriteSubspace(written, path).ok());
+    Result<Subspace> s = ReadSubspace(path);
+    EXPECT_TRUE(s.ok()) << s.status().ToString();
+    return s->tiles[0].digest();
+  };
+  const Subspace smallest = SmallestSubspace();
+  Subspace other = SmallestSubspace();
+  TileData data = other.tiles[0].data();
+  data.mean.data()[129] += 0.125f;
+  other.tiles[0] = *TileMap::Make(std::move(data), "column");
+  EXPECT_EQ(read(smallest), read(smallest));
+  EXPECT_NE(read(smallest), read(other));
+  EXPECT_EQ(smallest.tiles[0].digest(), SmallestSubspace().tiles[0].digest());
+  EXPECT_NE(smallest.tiles[0].digest(), other.tiles[0].digest());
+  // Of a file before version 9, whose digest is not of all that it says
+  const Result<Subspace> old = ReadSubspace(PathOfVersion(8));
+  ASSERT_TRUE(old.ok()) << old.status().ToString();
+  EXPECT_EQ(old->tiles[0].digest(), TileMap::Make(old->tiles[0].data(), "column")->digest());
+  // Changed since
+  Result<Subspace> s = ReadSubspace(folder / "one.kpsa");
+  ASSERT_TRUE(s.ok()) << s.status().ToString();
+  const std::vector<double> factors(s->tiles[0].tiles(), 2);
+  EXPECT_NE(s->tiles[0].WithDoubts(factors).digest(), s->tiles[0].digest());
+}
+
 }  // namespace
 }  // namespace kpsa::engine

@@ -38,8 +38,32 @@ class DeltaMushLastStep : public testing::Test {
     const Result<Compiler::SplitPoints> split = Compiler().Split(g.graph, g.plug(output));
     EXPECT_TRUE(split.ok()) << split.status().ToString();
     if (!split.ok()) return nullptr;
+    ExpectTheSurveys(*split, output);
     in = split->in;
     return split->step;
+  }
+  // Together with steps under what varies, the same is found.
+  void ExpectTheSurveys(const Compiler::SplitPoints& split, const std::string& output) {
+    Request request;
+    request.outputs.push_back({g.plug(output), {}});
+    request.varying = {g.plug("a.matrix")};
+    const auto survey = Compiler().SurveyOf(g.graph, request, {PlugRef(), g.plug(output)});
+    ASSERT_TRUE(survey.ok()) << survey.status().ToString();
+    ASSERT_EQ(survey->split.size(), 2u);
+    EXPECT_EQ(survey->split[0].step, nullptr);
+    const Compiler::SplitPoints& found = survey->split[1];
+    EXPECT_EQ(found.in, split.in);
+    ASSERT_EQ(found.step == nullptr, split.step == nullptr);
+    if (split.step != nullptr) {
+      EXPECT_EQ(found.step->inner_points(), split.step->inner_points());
+    }
+    const auto steps = Compiler().Steps(g.graph, request);
+    ASSERT_TRUE(steps.ok()) << steps.status().ToString();
+    ASSERT_EQ(survey->steps.size(), steps->size());
+    for (std::size_t s = 0; s < steps->size(); ++s) {
+      EXPECT_EQ(survey->steps[s].node, (*steps)[s].node);
+      EXPECT_EQ(survey->steps[s].points, (*steps)[s].points);
+    }
   }
   void Shear() {
     Matrix4 m = RotationFromEuler({0.3, 0.2, -0.5}, RotateOrder::kXyz);
@@ -57,7 +81,11 @@ class DeltaMushLastStep : public testing::Test {
     ASSERT_EQ(3 * step.points(), came.size());
     PointBuffer inner(step.inner_points()), out(step.points());
     step.Inner(PointBuffer::FromInterleaved(came).view(), inner.view());
-    const auto bound = step.Bind(PointSet::All(static_cast<Index>(step.points())));
+    const PointSet all = PointSet::All(static_cast<Index>(step.points())),
+                   some = PointSet::Of({3, 4, 50}, all.total());
+    EXPECT_EQ(step.InnerOf(some), step.Bind(some)->inner());
+    const auto bound = step.Bind(all);
+    EXPECT_EQ(step.InnerOf(all), bound->inner());
     AlignedFloats scratch(bound->scratch_floats());
     bound->Run(inner.view(), out.view(), scratch.span());
     ExpectPoints(out.Interleaved(), {expected.begin(), expected.end()}, 2e-6);
@@ -189,6 +217,11 @@ TEST_F(DeltaMushLastStep, OfAnotherMeshIsAnError) {
   const auto split = Compiler().Split(g.graph, g.plug("d.outPoints[0]"));
   ASSERT_FALSE(split.ok());
   EXPECT_NE(split.status().ToString().find("25 points"), std::string::npos) << split.status().ToString();
+  Request request;
+  request.outputs.push_back({g.plug("a.outPoints[0]"), {}});
+  const auto survey = Compiler().SurveyOf(g.graph, request, {g.plug("d.outPoints[0]")});
+  ASSERT_FALSE(survey.ok());
+  EXPECT_EQ(survey.status().ToString(), split.status().ToString());
 }
 
 }  // namespace
