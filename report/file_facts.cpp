@@ -216,6 +216,9 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                             ? std::string("points before the last step")
                             : fmt::format("points, and of {} tiles those before the last step", stepped));
   }
+  if (std::isfinite(subspace->activity_limit))
+    facts.facts.emplace_back("most at once", fmt::format("{:.3g}, of squared shares of what signals reached",
+                                                         subspace->activity_limit));
   std::size_t mended = 0;
   for (const TileMend& mend : subspace->mends) mended += mend.points.size();
   if (mended > 0) facts.facts.emplace_back("mended points", fmt::format("{}, by their last step", mended));

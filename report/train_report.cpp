@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/quantity_text.h"
@@ -178,6 +179,10 @@ std::string TrainText(const TrainResult& r) {
                         100.0 * static_cast<double>(kind.hits) / static_cast<double>(kind.poses),
                         kind.violations, 100 * kind.upper_bound);
   }
+  if (std::isfinite(r.subspace->activity_limit))
+    text +=
+        "poses with many controls far out would hit and be wrong: where a quarter more is out of rest at once "
+        "than in the clips, they miss\n";
   if (!r.worst_path.empty()) {
     text += fmt::format("worst that is accepted: {} ({}{}); {} replays it\n", error(r.record.worst.error),
                         r.record.worst.kind,

@@ -71,9 +71,12 @@ Counted AtEnds(const std::string& rig, const std::shared_ptr<const Subspace>& su
 TEST(ManyAtOnce, AFaceWithAllControlsAtTheirEndsIsRightOrMisses) {
   const std::string rig = KPSA_SCENES_DIR "/face/face.yaml";
   const TemporaryFolder folder;
-  const ProcessResult run =
-      RunKpsa({"train", rig, "--samples", "800", "-q", "-o", folder / "face.kpsa"}, 600);
+  const ProcessResult run = RunKpsa({"train", rig, "--samples", "800", "-o", folder / "face.kpsa"}, 600);
   ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("poses with many controls far out would hit and be wrong"), std::string::npos)
+      << run.out;
+  const ProcessResult told = RunKpsa({"inspect", folder / "face.kpsa"}, 60);
+  EXPECT_NE(told.out.find("most at once"), std::string::npos) << told.out;
   const Result<Subspace> read = ReadSubspace(folder / "face.kpsa");
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   ASSERT_TRUE(std::isfinite(read->activity_limit));

@@ -119,6 +119,10 @@ void WriteSubspaces(const std::string& folder) {
   Subspace mended = s;
   mended.mends = {mend};
   Check(WriteSubspace(mended, folder + "/mends.kpsa"));
+  Subspace limited = s;
+  limited.activity_limit = 2.5;
+  for (TrainedRange& range : limited.ranges) range.rest = 0.25, range.reach = 0.75;
+  Check(WriteSubspace(limited, folder + "/limited.kpsa"));
   s.patches = MakePatchLayout(s.tiles_of_outputs());
   s.patches.costs.assign(s.patches.regions.size(), 0.1);
   s.calibration = {{0.5, 1e-4, 0, 0}};
