@@ -1,6 +1,7 @@
 #include "graph/compiler.h"
 
 #include <map>
+#include <unordered_map>
 
 #include "graph/authored.h"
 #include "graph/builtin_steps.h"
@@ -156,8 +157,15 @@ Status ReachOutputs(const Graph& graph, const Request& request, InstanceTable* t
 }  // namespace
 
 struct Compiler::Impl {
-  std::map<Digest, BoundKernel> kernels;
-  std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> rest;
+  // A digest is as good as a random number already
+  struct DigestHash {
+    std::size_t operator()(const Digest& digest) const { return static_cast<std::size_t>(digest.lo); }
+  };
+  template <typename T>
+  using ByDigest = std::unordered_map<Digest, T, DigestHash>;
+  using RestOutputs = ByDigest<std::shared_ptr<const StaticEvaluator::Outputs>>;
+  ByDigest<BoundKernel> kernels;
+  RestOutputs rest;
   CompileStats stats;
 
   // A kernel that was bound before, or one that is bound now and kept.
@@ -191,10 +199,8 @@ struct Compiler::Impl {
       return KernelOf(table, statics, digests, instance, sets, &key);
     });
   }
-  std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> RestOf(const InstanceTable& table,
-                                                                           StaticEvaluator& statics,
-                                                                           const RestDigests& digests) {
-    std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> kept;
+  RestOutputs RestOf(const InstanceTable& table, StaticEvaluator& statics, const RestDigests& digests) {
+    RestOutputs kept;
     for (Index i = 0; i < table.instances().size(); ++i) {
       if (auto outputs = statics.FindRest(i)) kept.emplace(digests[i], std::move(outputs));
     }
@@ -251,7 +257,7 @@ Result<std::shared_ptr<const Plan>> Compiler::CompileOrThrow(const Graph& graph,
 
   // Bind kernels, or take them from an earlier compilation
   std::vector<BoundKernel> kernels(draft->steps.size());
-  std::map<Digest, BoundKernel> used;
+  Impl::ByDigest<BoundKernel> used;
   for (Index s = 0; s < draft->steps.size(); ++s) {
     const DraftStep& step = draft->steps[s];
     const Instance* instance = step.instance == kNoIndex ? nullptr : &table.instances()[step.instance];

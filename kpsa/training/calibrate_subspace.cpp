@@ -367,6 +367,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
                         kCalibrationConfidence);
   cost.lost_of_clips = best.lost_of_clips;
   const Calibration& calibration = best.calibration;
+  work.record->worst = {};  // an earlier calibration's
   if (calibration.worst != Calibration::kNoPose)
     RecordWorst(of, best.judged.poses[calibration.worst], calibration.worst_error, work.record);
   return cost;

@@ -1,5 +1,7 @@
 // What training tries where many poses would miss: tiles stored finely, cues as for half the tolerance.
 #include <algorithm>
+#include <set>
+#include <string>
 
 #include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
@@ -18,7 +20,12 @@ class FinerTiles : public ::testing::Test {
     options.inner = TrainOptions::Inner::kNever;
     const auto trained = TrainRig(kHello, options);
     EXPECT_NE(trained, nullptr);
-    return trained == nullptr ? std::vector<TrainingRecord::Tried>() : ParseTraining(trained->training).tried;
+    if (trained == nullptr) return {};
+    const TrainingRecord record = ParseTraining(trained->training);
+    // Of the worst pose each control once, however often there was calibrated
+    std::set<std::string> controls;
+    for (const auto& [plug, value] : record.worst.controls) EXPECT_TRUE(controls.insert(plug).second) << plug;
+    return record.tried;
   }
   static void ExpectTheCheaperIsTaken(const TrainOptions& options) {
     const std::vector<TrainingRecord::Tried> tried = Tried(options);
