@@ -172,7 +172,8 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
   for (const PlugRef& plug : plugs) request.outputs.push_back({plug, {}});
   request.varying = varying;
   Result<Compiler::Survey> survey = compiler->SurveyOf(
-      graph, request, NeedsSteps(subspace) ? SplittablePoints(graph, target) : std::vector<PlugRef>());
+      graph, request,
+      NeedsSteps(subspace) && !data.always_miss ? SplittablePoints(graph, target) : std::vector<PlugRef>());
   if (!survey.ok()) return survey.status();
   *split = std::move(survey->split);
   Result<std::vector<Signal>> signals =

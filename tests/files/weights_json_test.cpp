@@ -162,7 +162,7 @@ TEST(Weights, ManyMaps) {
 // Four times as many maps take four times as many instructions, and not the more that comparing each with those before
 // it would take.
 TEST(InstructionCount, OfWeightMapsGrowsAsTheirNumber) {
-  constexpr int kFew = 40, kMany = 4 * kFew;
+  constexpr int kFew = 20, kMany = 4 * kFew;
   constexpr double kLinear = 4.2;
   const TemporaryFolder folder;
   const auto reading = [&](int maps) {
