@@ -41,7 +41,7 @@ class LastStep {
   // in: all points that come into the node. May allocate.
   virtual void Inner(ConstPointsView in, PointsView inner) const = 0;
   virtual std::unique_ptr<const Bound> Bind(const PointSet& out) const = 0;
-  // Where that is all that is asked for; it may cost less.
+  // Bind(out)->inner(), ascending; it may cost less.
   virtual std::vector<Index> InnerOf(const PointSet& out) const { return Bind(out)->inner(); }
 };
 

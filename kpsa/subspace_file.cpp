@@ -96,7 +96,7 @@ Result<Subspace> SubspaceContent(const SafetensorsFile& file, KeptModes modes) {
     if (rows == 0 || s.latent.empty() || s.latent.size() % rows != 0)
       return Status::Invalid("{} latent factors of {} rows", s.latent.size(), rows);
   }
-  // Where it is not the file's, ReadSubspace refuses it
+  // What the file claims: where that is not its digest, ReadSubspace refuses it
   const Result<std::string> digest = file.Metadata(kDigest);
   KPSA_RETURN_IF_ERROR(ReadTiles(file, digest.ok() && !has_json_lists ? *digest : "", &s));
   KPSA_RETURN_IF_ERROR(ReadCalibration(file, &s));
