@@ -85,6 +85,18 @@ SymmetricEigen LargestEigen(const Eigen::MatrixXd& matrix, Eigen::Index m, std::
   }
 }
 
+SymmetricEigen EigenOfImage(const Eigen::MatrixXd& map, const Eigen::MatrixXd& inner) {
+  const Eigen::Index rank = map.cols();
+  if (rank >= map.rows()) return AllEigen(map * inner * map.transpose());
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(map);
+  const Eigen::MatrixXd r = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
+  SymmetricEigen eigen = AllEigen(r * inner * r.transpose());
+  Eigen::MatrixXd vectors = Eigen::MatrixXd::Zero(map.rows(), rank);
+  vectors.topRows(rank) = eigen.vectors;
+  vectors.applyOnTheLeft(qr.householderQ());
+  return {std::move(eigen.values), std::move(vectors)};
+}
+
 void Orthonormalize(Eigen::MatrixXd* tall) {
   for (int pass = 0; pass < 3; ++pass) {
     const Eigen::MatrixXd gram = Gram(GemmOperand::Dense(*tall).Transposed());

@@ -17,6 +17,9 @@ SymmetricEigen AllEigen(const Eigen::MatrixXd& matrix);
 // pairs are small against their eigenvalues, or eight times m long: slow decay leaves the last pairs with a
 // larger residual then.
 SymmetricEigen LargestEigen(const Eigen::MatrixXd& matrix, Eigen::Index m, std::uint64_t seed);
+// The eigenpairs of map * inner * map^T [n x n] that may be other than zero: min(n, r) of them. map [n x r]; inner [r x r]
+// symmetric.
+SymmetricEigen EigenOfImage(const Eigen::MatrixXd& map, const Eigen::MatrixXd& inner);
 
 // Makes the columns of a tall matrix orthonormal without leaving their span: Cholesky QR, repeated;
 // Householder where the columns are too dependent for that.

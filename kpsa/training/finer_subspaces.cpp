@@ -49,11 +49,14 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
     KPSA_RETURN_IF_ERROR(Calibrate(&now));
     return add(what, std::move(now));
   };
+  const auto take = [&](TileSubspace tiles) {
+    of.cues.set = std::move(tiles.cues);
+    return std::move(tiles.subspace);
+  };
   const auto again = [&](const char* what, bool finely = true) {
     Subspace now;
     if (of.by_tile) {
-      TileSubspace tiles = of.OfTiles(finely);
-      now = std::move(tiles.subspace), of.cues.set = std::move(tiles.cues);
+      now = take(of.OfTiles(finely));
     } else {
       now = of.ForAllPoints(true);
     }
@@ -72,7 +75,8 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
       KPSA_RETURN_IF_ERROR(calibrated(kFinelyStored, std::move(of.others)));
     } else {
       of.by_tile = true;
-      KPSA_RETURN_IF_ERROR(again(of.others_finely ? kByTileFinely : kByTile, of.others_finely));
+      KPSA_RETURN_IF_ERROR(
+          calibrated(of.others_finely ? kByTileFinely : kByTile, take(std::move(of.others_of_tiles))));
       for_all_points(), of.by_tile = false;
     }
   }

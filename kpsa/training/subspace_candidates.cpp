@@ -150,7 +150,10 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     by_tile = of_tiles.ns < alike() * of_others->ns;
     Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, of_others->misses, of_others->ns);
     others_ns = by_tile ? of_others->ns : of_tiles.ns, others_finely = fine;
-    if (!by_tile) best = record->tried.size() - 1, fine = for_all_finely_;
+    if (!by_tile) {
+      best = record->tried.size() - 1, fine = for_all_finely_;
+      others_of_tiles = std::move(with_tiles);
+    }
     if (by_tile && for_all_finely_) others = std::move(*subspace);
   }
   record->tried[best].taken = true;
@@ -207,7 +210,10 @@ Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
     }
     for (TrainingRecord::Tried& one : record->tried) one.taken = false;
     record->tried.back().taken = true;
-    if (by_tile) others_ns = best_ns_, others_finely = fine;
+    if (by_tile) {
+      others_ns = best_ns_, others_finely = fine;
+      others_of_tiles = {std::move(*subspace), before};
+    }
     *subspace = std::move(made), best_ns_ = priced->ns;
     by_tile = false, fine = fewer = true;
     cues.choice.cues = other.cues;

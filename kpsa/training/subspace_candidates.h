@@ -55,12 +55,14 @@ struct SubspaceCandidates {
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried
   RangeFinder ranges_of_tiles = {};    // of the poses that these alone were trained on
-  // With cues for all points, where those of tiles were taken: not calibrated; without tiles where nobody made it, or not
-  // finely
+  // What was not taken, not calibrated: with cues for all points, where those of tiles were; without tiles where nobody made
+  // it, or not finely
   Subspace others = {};
-  // What these, or those of tiles where they were not taken, were expected to cost, at least
+  // Or with cues of tiles, and whether these are stored finely
+  TileSubspace others_of_tiles = {};
+  bool others_finely = false;
+  // What that was expected to cost, at least
   double others_ns = std::numeric_limits<double>::infinity();
-  bool others_finely = false;  // the tiles of the latter
 
   // The subspace with which a frame is expected to cost least, by the judges; none where some tiles are poor, or where
   // it is dear and cues of tiles do not serve.

@@ -41,20 +41,19 @@ class TileFactorer {
     if (samples.size() > 0) moved_ = Multiply(gain, samples);
     // Directions of the motion, rare ones included: what is dropped costs a hundredth of the budget, and in
     // any one sample a tenth of the largest error
-    Eigen::MatrixXd gram = Multiply(GemmOperand::Dense(motion_), GemmOperand::Dense(gain).Transposed());
-    total_ = gram.trace();
-    if (moved_.size() > 0 && std::isfinite(max_budget_))
-      gram += budget_ / (max_budget_ * max_budget_) * GramOf(moved_);
-    const double all = gram.trace();
-    SymmetricEigen eigen =
-        gram.rows() > 2 * kDirections ? LargestEigen(gram, kDirections, 1) : AllEigen(gram);
-    if (all - eigen.values.cwiseMax(0.0).sum() > 0.01 * budget_) eigen = AllEigen(gram);
+    const double of_samples =
+        moved_.size() > 0 && std::isfinite(max_budget_) ? budget_ / (max_budget_ * max_budget_) : 0;
+    total_ = motion_.cwiseProduct(gain).sum();
+    const double all = total_ + (of_samples > 0 ? of_samples * moved_.squaredNorm() : 0);
+    const SymmetricEigen eigen = Directions(of_samples, all);
     double rest = all;
     Eigen::Index q = 0;
     while (q < eigen.values.size() && rest > 0.01 * budget_ && eigen.values[q] > 1e-14 * eigen.values[0])
       rest -= eigen.values[q++];
     basis_ = eigen.vectors.leftCols(q);
     if (moved_.size() > 0) sample_motion_ = Multiply(basis_.transpose(), moved_);
+    own_cross_ = Multiply(basis_.transpose(), motion_);
+    own_variance_ = own_cross_.cwiseProduct(Multiply(basis_.transpose(), gain)).sum();
     weights_.setZero(samples.cols());
     Weigh();
   }
@@ -77,11 +76,27 @@ class TileFactorer {
   }
 
  private:
+  // Of the motion's covariance, and so many times that of the samples; `all`: its trace.
+  SymmetricEigen Directions(double of_samples, double all) const {
+    if (2 * gain_.cols() <= gain_.rows()) {  // there are no more than numbers that tell it
+      Eigen::MatrixXd spread = covariance_;
+      if (of_samples > 0) spread += of_samples * GramOf(samples_);
+      return EigenOfImage(gain_, spread);
+    }
+    Eigen::MatrixXd gram = Multiply(GemmOperand::Dense(motion_), GemmOperand::Dense(gain_).Transposed());
+    if (of_samples > 0) gram += of_samples * GramOf(moved_);
+    if (gram.rows() > 2 * kDirections) {
+      SymmetricEigen eigen = LargestEigen(gram, kDirections, 1);
+      if (all - eigen.values.cwiseMax(0.0).sum() <= 0.01 * budget_) return eigen;
+    }
+    return AllEigen(gram);
+  }
+
   // The covariances of y, and of s and y, with the weights of samples.
   void Weigh() {
     weighted_covariance_ = covariance_;
-    cross_ = basis_.transpose() * motion_;
-    variance_ = (basis_.transpose() * motion_ * gain_.transpose() * basis_).trace();
+    cross_ = own_cross_;
+    variance_ = own_variance_;
     for (Eigen::Index i = 0; i < weights_.size(); ++i) {
       if (weights_[i] == 0) continue;
       weighted_covariance_.noalias() += weights_[i] * samples_.col(i) * samples_.col(i).transpose();
@@ -257,6 +272,8 @@ class TileFactorer {
   Eigen::MatrixXd motion_;  // B G [cn x r]
   Eigen::MatrixXd moved_;   // B Y [cn x S]
   Eigen::MatrixXd basis_, sample_motion_;
+  Eigen::MatrixXd own_cross_;                    // of s and y, without weights of samples [q x r]
+  double own_variance_ = 0;                      // likewise of s
   Eigen::VectorXd weights_, sample_errors_;      // [S]
   Eigen::MatrixXd weighted_covariance_, cross_;  // [r x r], [q x r]
   double variance_ = 0;                          // of s

@@ -24,7 +24,6 @@ constexpr double kExplained = 0.98;        // of what all products explain that 
 constexpr std::size_t kMostProducts = 15;  // as far as so many can
 constexpr double kRidge[] = {1e-3, 1e-2, 1e-1, 1};  // of a product's variance
 constexpr double kExtraShare = 0.3;  // of the RMS budget: what the directions of products may leave out
-constexpr Eigen::Index kMostExtra = 24;
 constexpr double kByte = 127;
 
 class ProductFitter {
@@ -156,12 +155,11 @@ class ProductFitter {
     };
     Eigen::MatrixXd w = onto(f_.u, map);
     const Eigen::MatrixXd rest = map - f_.u * w;
-    const Eigen::MatrixXd spread = rest * gram_ / static_cast<double>(poses_);
-    const SymmetricEigen eigen =
-        LargestEigen(spread * rest.transpose(), std::min<Eigen::Index>(kMostExtra, rest.cols()), 1);
+    const Eigen::MatrixXd variance = gram_ / static_cast<double>(poses_);
+    const SymmetricEigen eigen = EigenOfImage(rest, variance);
     const double budget =
         kExtraShare * options_.rms_budget * options_.rms_budget * static_cast<double>(f_.u.rows() / 3);
-    double left = spread.cwiseProduct(rest).sum();
+    double left = (rest * variance).cwiseProduct(rest).sum();
     Eigen::Index extra = 0;
     while (extra < eigen.values.size() && left > budget &&
            f_.u.cols() + extra < static_cast<Eigen::Index>(kMaxTileRank) - f_.wide)

@@ -130,6 +130,28 @@ TEST(EigenSolvers, VectorsAreOrthonormalWhereTheRankIsLow) {
   }
 }
 
+TEST(EigenSolvers, PairsOfAnImageAreThoseOfItsProduct) {
+  const auto check = [](const Eigen::MatrixXd& map, const Eigen::MatrixXd& inner) {
+    const Eigen::MatrixXd product = map * inner * map.transpose();
+    const SymmetricEigen eigen = EigenOfImage(map, inner);
+    const Eigen::Index k = eigen.values.size();
+    ASSERT_EQ(k, std::min(map.rows(), map.cols()));
+    EXPECT_LT(Difference(eigen.vectors.transpose() * eigen.vectors, Eigen::MatrixXd::Identity(k, k)), 1e-12);
+    EXPECT_LT(Difference(eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose(), product) /
+                  product.norm(),
+              1e-13);
+    EXPECT_LT((eigen.values - AllEigen(product).values.head(k)).norm() / product.norm(), 1e-13);
+  };
+  for (const auto& [n, r] : {std::pair<Eigen::Index, Eigen::Index>{384, 30}, {20, 20}, {3, 15}, {7, 1}}) {
+    SCOPED_TRACE(n);
+    Eigen::MatrixXd map = RandomNormal(n, r, static_cast<std::uint64_t>(n));
+    const Eigen::MatrixXd inner = Gram(GemmOperand::Dense(RandomNormal(r, r + 3, 2)));
+    check(map, inner);
+    if (r > 2) map.col(1) = map.col(0), map.col(2).setZero();
+    check(map, inner);
+  }
+}
+
 TEST(EigenSolvers, OrthonormalizeKeepsTheSpanOfDependentColumns) {
   Eigen::MatrixXd a = RandomNormal(300, 20, 7);
   for (Eigen::Index k = 0; k < 20; ++k)
