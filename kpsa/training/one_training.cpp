@@ -140,7 +140,8 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   TrainingModes modes;
   KPSA_RETURN_IF_ERROR(FindModes(setup, &poses, &modes, &record));
   SubspaceCandidates candidates{&setup, &poses, &modes, &record, setup.limit.elapsed() - before_modes};
-  KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
+  if (!candidates.by_tiles_alone())  // else nobody asks what all points would measure
+    KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
 
   const CueChoice& choice = candidates.cues.choice;
   // Another training has to fit

@@ -94,7 +94,10 @@ Status FindModes(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes
                               ? static_cast<int>(setup.options.key_points / 2)
                               : setup.options.max_modes;
   if (setup.of_light()) pca_options.max_modes = std::min(pca_options.max_modes, kMaxLightModes);
-  if (!setup.rig.stepped.empty()) pca_options.max_modes = std::min(pca_options.max_modes, kFewModes);
+  if (!setup.rig.stepped.empty()) {
+    pca_options.max_modes = std::min(pca_options.max_modes, kFewModes);
+    pca_options.method = PcaOptions::Method::kRandomised;  // for so few without the products of all poses
+  }
   Result<Pca> pca = ComputePca(poses->poses, mean, pca_options);
   if (!pca.ok()) return pca.status();
   modes->pca = std::move(*pca);

@@ -63,8 +63,9 @@ Status TrainingSetup::Prepare() {
     recorder->Only(std::move(some));
     recorder->KeepOrigins();
   }
-  Result<PoseLayout> found_layout =
-      recorder->Layout(measures && !options.without.cue_products ? kCueProducts : 0);
+  const bool products =
+      measures && !options.without.cue_products && rig.stepped.empty();  // tiles have their own
+  Result<PoseLayout> found_layout = recorder->Layout(products ? kCueProducts : 0);
   if (!found_layout.ok()) return found_layout.status();
   layout = *found_layout;
   sampler = std::make_shared<TrainingSampler>(rig, drawn, clips, options, recorder.get(), layout);
