@@ -87,6 +87,7 @@ SymmetricEigen LargestEigen(const Eigen::MatrixXd& matrix, Eigen::Index m, std::
 
 SymmetricEigen EigenOfImage(const Eigen::MatrixXd& map, const Eigen::MatrixXd& inner) {
   const Eigen::Index rank = map.cols();
+  if (rank == 0) return {Eigen::VectorXd(0), Eigen::MatrixXd(map.rows(), 0)};
   if (rank >= map.rows()) return AllEigen(map * inner * map.transpose());
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(map);
   const Eigen::MatrixXd r = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();

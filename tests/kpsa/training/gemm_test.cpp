@@ -150,6 +150,7 @@ TEST(EigenSolvers, PairsOfAnImageAreThoseOfItsProduct) {
     if (r > 2) map.col(1) = map.col(0), map.col(2).setZero();
     check(map, inner);
   }
+  EXPECT_EQ(EigenOfImage(Eigen::MatrixXd(6, 0), Eigen::MatrixXd(0, 0)).vectors.rows(), 6);
 }
 
 TEST(EigenSolvers, OrthonormalizeKeepsTheSpanOfDependentColumns) {
