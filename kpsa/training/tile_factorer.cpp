@@ -78,7 +78,7 @@ class TileFactorer {
  private:
   // Of the motion's covariance, and so many times that of the samples; `all`: its trace.
   SymmetricEigen Directions(double of_samples, double all) const {
-    if (2 * gain_.cols() <= gain_.rows()) {  // there are no more than numbers that tell it
+    if (2 * gain_.cols() <= gain_.rows()) {  // no more directions than numbers that tell it
       Eigen::MatrixXd spread = covariance_;
       if (of_samples > 0) spread += of_samples * GramOf(samples_);
       return EigenOfImage(gain_, spread);
