@@ -21,11 +21,25 @@ constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
 // Of the poses, that any tile is expected to leave beyond half the tolerance: with more, doubts tell too few apart
 constexpr double kMostBeyondHalf = 0.25;
+// One of about so many tiles may be poor, where the others leave so much less: what it misses is priced
+constexpr std::size_t kMayBePoor = 16;
+constexpr double kOfOthers = 0.5;
 // Of what steps may cost, where some tiles stand for all: among the others are more that need one
 constexpr double kOfMost = 0.7;
 // Of the tiles: so few may be to blame that the others are not worth their time. With more, other ways cost about as
 // much
 constexpr double kMostPoor = 1.0 / 3;
+
+// All tiles, in the order of how many poses they leave farther off.
+std::vector<std::size_t> WorstFirst(const Eigen::MatrixXf& errors, double tolerance) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(errors.cols()));
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const Eigen::VectorXi beyond =
+      (errors.array() > static_cast<float>(tolerance)).cast<int>().colwise().sum().transpose();
+  std::ranges::stable_sort(order, std::greater<>(),
+                           [&](std::size_t t) { return beyond[static_cast<Eigen::Index>(t)]; });
+  return order;
+}
 
 // The cues of some rows of a set.
 CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
@@ -167,19 +181,17 @@ double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<co
   return static_cast<double>(beyond) / static_cast<double>(std::max<Eigen::Index>(errors.rows(), 1));
 }
 
-double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every) {
-  const auto beyond = (errors.array() > static_cast<float>(tolerance)).count();
+double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every,
+                      std::span<const std::size_t> but) {
+  Eigen::Index beyond = (errors.array() > static_cast<float>(tolerance)).count();
+  for (const std::size_t t : but)
+    beyond -= (errors.col(static_cast<Eigen::Index>(t)).array() > static_cast<float>(tolerance)).count();
   return static_cast<double>(every) * static_cast<double>(beyond) /
          static_cast<double>(std::max<Eigen::Index>(errors.rows(), 1));
 }
 
 std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most) {
-  std::vector<std::size_t> order(static_cast<std::size_t>(errors.cols()));
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const Eigen::VectorXi beyond =
-      (errors.array() > static_cast<float>(tolerance)).cast<int>().colwise().sum().transpose();
-  std::ranges::stable_sort(order, std::greater<>(),
-                           [&](std::size_t t) { return beyond[static_cast<Eigen::Index>(t)]; });
+  std::vector<std::size_t> order = WorstFirst(errors, tolerance);
   // Fewer of the worst leave more
   std::size_t lo = 0, hi = order.size();
   while (lo < hi) {
@@ -215,17 +227,24 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
                                     std::vector<TileCandidates> candidates, const TileCueOptions& options,
                                     const TilePromise& promise) {
   const double half = options.tolerance / 2;
-  const auto keeps = [&](const Eigen::MatrixXf& errors) {
-    return ShareBeyond(errors, half) <= promise.most_of_half ||
-           ShareBeyond(errors, kOfWhole * options.tolerance) <= promise.most_of_whole;
+  const auto keeps = [&](const Eigen::MatrixXf& errors, std::span<const std::size_t> but = {}) {
+    return ShareBeyond(errors, half, but) <= promise.most_of_half ||
+           ShareBeyond(errors, kOfWhole * options.tolerance, but) <= promise.most_of_whole;
   };
   const bool many = candidates.size() > kTrialTiles * kTrialTiles;
-  bool promising = promise.steps.ns.empty() && !promise.strict;
+  const bool may_be_poor = promise.steps.ns.empty() && !promise.strict;
+  bool promising = may_be_poor;
   if (many) {
     std::vector<TileCandidates> some;
     for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
     const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
     promising = keeps(trial) && ExpectedBeyond(trial, half, kTrialTiles) <= kMostBeyondHalf;
+    if (!promising && may_be_poor) {
+      std::vector<std::size_t> worst = WorstFirst(trial, half);
+      worst.resize((worst.size() + kMayBePoor / 2) / kMayBePoor);
+      promising = keeps(trial, worst) &&
+                  ExpectedBeyond(trial, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
+    }
     if (!promising && PoorTiles(trial, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
   }
   PromisingTiles found{ChooseTiles(mean, poses, std::move(candidates), options), {}};

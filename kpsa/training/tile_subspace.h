@@ -78,7 +78,8 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
 // Share of the poses in which a tile is farther off, but some of them.
 double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but = {});
 // The same of `every` times as many tiles, as far as each is beyond in poses of its own.
-double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every);
+double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every,
+                      std::span<const std::size_t> but = {});
 // The fewest tiles, the worst first, but for which that is at most `most`; ascending.
 std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most);
 

@@ -224,19 +224,26 @@ TEST(TileCues, AreGivenUpWhereSomeOfManyLeaveMuch) {
   errors.col(4).head(3).setConstant(2), errors.col(1).tail(2).setConstant(2);
   EXPECT_EQ(ExpectedBeyond(errors, 1, 8), 0.4);
   EXPECT_EQ(ExpectedBeyond(errors, 2, 8), 0);
+  EXPECT_EQ(ExpectedBeyond(errors, 1, 8, std::vector<std::size_t>{4}), 0.16);
 
   const Limb limb(true);
-  const auto promises = [&](bool told, double most_of_half, double most_of_whole) {
+  const auto promises = [&](bool told, double most_of_half, double most_of_whole, std::size_t untold = 0) {
     TileCandidates tile = limb.choice.candidates[0];
     TileCueOptions options = limb.choice.options;
-    if (!told) tile.joints.clear(), tile.points.clear(), tile.own_points = 0, options.values.clear();
-    return ChoosePromisingTiles(limb.mean, limb.poses, std::vector(72, tile), options,
+    if (!told) options.values.clear();
+    TileCandidates blind = tile;
+    blind.joints.clear(), blind.points.clear(), blind.own_points = 0;
+    std::vector<TileCandidates> tiles(72, told ? tile : blind);
+    for (std::size_t t = 0; t < untold; ++t) tiles[8 * t] = blind;
+    return ChoosePromisingTiles(limb.mean, limb.poses, std::move(tiles), options,
                                 {.most_of_half = most_of_half, .most_of_whole = most_of_whole})
         .choice.has_value();
   };
   EXPECT_TRUE(promises(true, 0.03, 0));
   EXPECT_FALSE(promises(false, 0.03, 0));
   EXPECT_FALSE(promises(false, 1, 1)) << "whatever may be left by some of them";
+  EXPECT_TRUE(promises(true, 0.03, 0, 1)) << "one of nine that are tried";
+  EXPECT_FALSE(promises(true, 0.03, 0, 2));
 }
 
 TEST(TileCues, PointsGoThroughTheMatrixOfTheJoint) {
