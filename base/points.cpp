@@ -9,13 +9,19 @@
 
 namespace kpsa::engine {
 
-AlignedFloats AlignedFloats::Uninitialized(std::size_t size) {
+AlignedFloats AlignedFloats::Untouched(std::size_t size) {
   AlignedFloats floats;
   if (size == 0) return floats;
   const std::size_t bytes = size * sizeof(float);
   floats.data_ = static_cast<float*>(::operator new(bytes, std::align_val_t(AlignmentFor(bytes))));
   floats.size_ = size;
-  FetchPages(floats.data_, bytes);
+  PreferLargePages(floats.data_, bytes);
+  return floats;
+}
+
+AlignedFloats AlignedFloats::Uninitialized(std::size_t size) {
+  AlignedFloats floats = Untouched(size);
+  if (size > 0) TouchPages(floats.data_, size * sizeof(float));
   return floats;
 }
 

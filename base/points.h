@@ -42,6 +42,8 @@ class AlignedFloats {
   explicit AlignedFloats(std::size_t size);  // zeros
   // To be written before they are read.
   static AlignedFloats Uninitialized(std::size_t size);
+  // Likewise, bit by bit: memory is taken as it is written (PreferLargePages).
+  static AlignedFloats Untouched(std::size_t size);
   AlignedFloats(AlignedFloats&&) noexcept;
   AlignedFloats& operator=(AlignedFloats&&) noexcept;
   AlignedFloats(const AlignedFloats& other);

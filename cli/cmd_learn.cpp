@@ -9,6 +9,7 @@
 #include "cli/common.h"
 #include "cli/frames_range.h"
 #include "cli/interrupt.h"
+#include "cli/memory_limit.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -25,6 +26,7 @@ struct LearnFlags : Flags {
 };
 
 CommandResult RunLearn(LearnFlags flags) {
+  KeepFreedMemory();
   const Result<int> threads = ThreadCount(flags);
   if (!threads.ok()) return threads.status();
   if (flags.rest) return Status::Usage("--rest: nothing moves in it, so there is nothing to learn");

@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/frames_range.h"
 #include "cli/interrupt.h"
+#include "cli/memory_limit.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -71,6 +72,7 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
 }
 
 CommandResult RunTrain(const TrainFlags& flags) {
+  KeepFreedMemory();
   const Result<int> threads = ThreadCount(flags);
   if (!threads.ok()) return threads.status();
   TrainOptions options;

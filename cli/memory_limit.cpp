@@ -2,6 +2,10 @@
 
 #include <sys/resource.h>
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -34,6 +38,14 @@ Status LimitMemory(std::string_view text) {
     if (::setrlimit(RLIMIT_AS, &limit) == 0) return Status();
   }
   return Status::Usage("--max-memory {}: {}", text, std::generic_category().message(errno));
+}
+
+void KeepFreedMemory() {
+#if defined(__GLIBC__)
+  constexpr int kLargest = 256 << 20, kKept = 1 << 30;
+  (void)::mallopt(M_MMAP_THRESHOLD, kLargest);
+  (void)::mallopt(M_TRIM_THRESHOLD, kKept);
+#endif
 }
 
 }  // namespace kpsa::engine

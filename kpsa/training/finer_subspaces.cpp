@@ -67,8 +67,11 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   };
   const char* const fine = of.by_tile ? kByTileFinely : of.fewer ? kFewerCues : kFinelyStored;
   KPSA_RETURN_IF_ERROR(add(of.fine ? fine : of.by_tile ? kByTile : kForAllPoints, std::move(*subspace)));
-  bool may_be_for_all = of.by_tile && !of.by_tiles_alone();
-  if (of.others_ns < trials.least_ns()) {  // calibration misses more than the judges of both did
+  bool may_be_for_all = of.by_tile && !of.knows_tiles_only();
+  // Finer tiles with cues of their own come first: they are taken at a higher cost than others
+  if (of.by_tile && !of.fine && of.IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));
+  if (of.others_ns < (of.by_tile ? trials.least_ns() / of.alike() : trials.least_ns())) {
+    // Calibration misses more than the judges of both did
     if (of.by_tile) {
       for_all_points(), may_be_for_all = false;
       if (of.others.tiles.empty()) of.others = of.ForAllPoints(true);
@@ -80,7 +83,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
       for_all_points(), of.by_tile = false;
     }
   }
-  if (!of.fine && of.IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));
+  if (!of.by_tile && !of.fine && of.IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));
   if (may_be_for_all && trials.least().misses > kTooManyMisses) {
     for_all_points(), of.by_tile = false;
     KPSA_RETURN_IF_ERROR(again(kFinelyStored));

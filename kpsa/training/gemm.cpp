@@ -106,6 +106,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 #include "base/cancel.h"
 #include "base/check.h"
+#include "base/fresh_pages.h"
 #include "base/parallel.h"
 
 namespace kpsa::engine {
@@ -250,6 +251,7 @@ void Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetr
     c->setZero();
     return;
   }
+  FetchPages(c->data(), m * n * sizeof(double));
   std::vector<Task> tiles;
   for (std::size_t j = 0; j < n; j += kTile) {
     for (std::size_t i = symmetric ? j : 0; i < m; i += kTile) tiles.push_back({i, j, 0, depth});

@@ -136,23 +136,9 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(FindRanges(&setup, poses, &ranges));
   if (setup.of_light() && setup.of_map()) poses.judges = poses.poses.TakeEvery(kJudgeOfLight);
 
-  // Modes and cues
   TrainingModes modes;
-  KPSA_RETURN_IF_ERROR(FindModes(setup, &poses, &modes, &record));
-  SubspaceCandidates candidates{&setup, &poses, &modes, &record, setup.limit.elapsed() - before_modes};
-  if (!candidates.by_tiles_alone())  // else nobody asks what all points would measure
-    KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
-
-  const CueChoice& choice = candidates.cues.choice;
-  // Another training has to fit
-  if (ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed())
-    candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
-  candidates.dear =
-      ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
-      std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
-
-  // Subspaces
-  KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
+  CentrePoses(setup, &poses, &modes, &record);
+  SubspaceCandidates candidates{&setup, &poses, &modes, &record};
   const bool of_points = !setup.of_light() && setup.of_map();
   if (of_points && !options.without.patches && rig.split.empty() && rig.some.empty()) {
     KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
@@ -160,29 +146,65 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     if (!patches.ok()) return patches.status();
     candidates.patches = std::move(*patches);
   }
-  Result<std::optional<Subspace>> best = candidates.Best();
-  if (!best.ok()) return best.status();
-  if (!*best) {
-    if (candidates.by_tiles_alone()) return Status::Invalid("no cues of tiles serve");
-    record.tried.push_back({kForAllPoints, choice.cues.size(),
-                            static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
-                            choice.cost / setup.full_cost, false});
-    Trained trained;
-    trained.record = std::move(record), trained.ended = true, trained.held = setup.sampler->held();
-    trained.ns = choice.cost, trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
-    if (!candidates.poor.empty()) trained.poor = ByMesh(setup, candidates.poor);
-    return trained;
-  }
-  Subspace subspace = std::move(**best);
-  KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
   const CandidateCalibrator calibrator{&candidates, ranges,
                                        CalibrationWithin(poses.pose_seconds, options, &setup.limit)};
-  KPSA_RETURN_IF_ERROR(calibrator.Calibrate(&subspace));
-  const FrameCost& cost = candidates.cost;
-  if (of_points && !options.without.miss_costs && calibrator.size.margins && candidates.IsWorthTrying(cost) &&
-      (!candidates.fine || cost.lost() > kTooManyMisses || candidates.others_ns < cost.ns) &&
-      setup.limit.left() > candidates.modes_seconds)
-    KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&subspace));
+  const auto calibrate = [&](Subspace* subspace) -> Status {
+    KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
+    KPSA_RETURN_IF_ERROR(calibrator.Calibrate(subspace));
+    const FrameCost& cost = candidates.cost;
+    if (of_points && !options.without.miss_costs && calibrator.size.margins &&
+        candidates.IsWorthTrying(cost) &&
+        (!candidates.fine || cost.lost() > kTooManyMisses || candidates.others_ns < cost.ns) &&
+        setup.limit.left() > candidates.modes_seconds)
+      return calibrator.TryFiner(subspace);
+    return Status();
+  };
+
+  // Tiles alone
+  std::optional<Subspace> made;
+  if (candidates.MayBeginWithTiles()) {
+    KPSA_RETURN_IF_ERROR(FindModes(setup, poses, true, &modes, &record));
+    Result<std::optional<Subspace>> of_tiles = candidates.OfTilesAlone();
+    if (!of_tiles.ok()) return of_tiles.status();
+    made = std::move(*of_tiles);
+    candidates.modes_seconds = setup.limit.elapsed() - before_modes;
+    if (made) KPSA_RETURN_IF_ERROR(calibrate(&*made));
+    if (made && candidates.cost.lost() > kTooManyMisses) {
+      candidates.LeaveTilesAlone();
+      made.reset();
+    }
+  }
+  // And cues for all points
+  if (!made) {
+    KPSA_RETURN_IF_ERROR(FindModes(setup, poses, candidates.by_tiles_alone(), &modes, &record));
+    candidates.modes_seconds = setup.limit.elapsed() - before_modes;
+    if (!candidates.by_tiles_alone())  // else nobody asks what all points would measure
+      KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
+    const CueChoice& choice = candidates.cues.choice;
+    // Another training has to fit
+    if (ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed())
+      candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
+    candidates.dear =
+        ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
+        std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
+    KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
+    Result<std::optional<Subspace>> best = candidates.Best();
+    if (!best.ok()) return best.status();
+    if (!*best) {
+      if (candidates.by_tiles_alone()) return Status::Invalid("no cues of tiles serve");
+      record.tried.push_back({kForAllPoints, choice.cues.size(),
+                              static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
+                              choice.cost / setup.full_cost, false});
+      Trained trained;
+      trained.record = std::move(record), trained.ended = true, trained.held = setup.sampler->held();
+      trained.ns = choice.cost, trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
+      if (!candidates.poor.empty()) trained.poor = ByMesh(setup, candidates.poor);
+      return trained;
+    }
+    made = std::move(*best);
+    KPSA_RETURN_IF_ERROR(calibrate(&*made));
+  }
+  Subspace subspace = std::move(*made);
 
   const auto with_held = [&](Result<Trained> trained) {
     if (trained.ok()) trained->held = setup.sampler->held();

@@ -29,7 +29,7 @@ void PoseMatrix::Append(PoseMatrix&& other) {
   KPSA_CHECK(layout_ == other.layout_ && (centered_ == other.centered_ || other.poses_ == 0));
   for (std::size_t t = 0; t < other.poses_; ++t) {
     Append(other, t);
-    if (t % kBlockPoses + 1 == kBlockPoses) other.blocks_[t / kBlockPoses].reset();
+    if (t % kBlockPoses + 1 == kBlockPoses) other.blocks_[t / kBlockPoses] = {};
   }
   other.Truncate(0);
 }
@@ -51,6 +51,14 @@ PoseMatrix PoseMatrix::TakeEvery(std::size_t count) {
   return taken;
 }
 
+PoseMatrix PoseMatrix::TakeAfter(std::size_t poses) {
+  PoseMatrix taken(layout_);
+  taken.centered_ = centered_;
+  for (std::size_t t = poses; t < poses_; ++t) taken.Append(*this, t);
+  Truncate(poses);
+  return taken;
+}
+
 void PoseMatrix::Truncate(std::size_t poses) {
   poses_ = std::min(poses_, poses);
   blocks_.resize((poses_ + kBlockPoses - 1) / kBlockPoses);
@@ -58,15 +66,14 @@ void PoseMatrix::Truncate(std::size_t poses) {
 }
 
 std::span<float> PoseMatrix::Grow() {
-  if (poses_ % kBlockPoses == 0)
-    blocks_.push_back(std::make_unique_for_overwrite<float[]>(kBlockPoses * columns()));
+  if (poses_ % kBlockPoses == 0) blocks_.push_back(AlignedFloats::Untouched(kBlockPoses * columns()));
   origins_.push_back(0);
   return row(poses_++);
 }
 
 std::span<float> PoseMatrix::row(std::size_t pose) {
   KPSA_DCHECK(pose / kBlockPoses < blocks_.size());
-  return {blocks_[pose / kBlockPoses].get() + pose % kBlockPoses * columns(), columns()};
+  return {blocks_[pose / kBlockPoses].data() + pose % kBlockPoses * columns(), columns()};
 }
 
 std::span<const float> PoseMatrix::row(std::size_t pose) const {

@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -64,6 +63,8 @@ class PoseMatrix {
   void Append(const PoseMatrix& other, std::size_t pose);  // one of them
   // Keeps the first poses.
   void Truncate(std::size_t poses);
+  // Likewise; the others are taken away.
+  PoseMatrix TakeAfter(std::size_t poses);
   // Takes the last of so many poses away, again and again.
   PoseMatrix TakeEvery(std::size_t count);
 
@@ -73,7 +74,7 @@ class PoseMatrix {
   PoseLayout layout_;
   std::size_t poses_ = 0;
   bool centered_ = false;
-  std::vector<std::unique_ptr<float[]>> blocks_;
+  std::vector<AlignedFloats> blocks_;
   std::vector<std::uint32_t> origins_;  // by pose
 };
 

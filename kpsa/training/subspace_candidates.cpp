@@ -45,7 +45,8 @@ bool SubspaceCandidates::HasTimeForTiles() {
 }
 
 bool SubspaceCandidates::IsWorthTrying(const FrameCost& of) const {
-  return of.lost() > kFewMisses && of.lost() * setup->full_cost > kWorthTrying * of.ns;
+  const double lost = std::max(of.lost(), of.lost_of_clips.value_or(0));
+  return lost > kFewMisses && lost * setup->full_cost > kWorthTrying * of.ns;
 }
 
 Subspace SubspaceCandidates::ForAllPoints(bool finely) {
@@ -71,7 +72,7 @@ Result<std::optional<Subspace>> SubspaceCandidates::Best() {
   for_all_finely_ = dear || setup->options.by_tile_as_before || (may_try && MissMany(cues.choice));
   if (!for_all_finely_) steps = {};  // another training is for what this one cannot do
   Subspace subspace;
-  if (may_try && (for_all_finely_ || by_tiles_alone() || TileCount() >= kManyTiles) && HasTimeForTiles()) {
+  if (may_try && (for_all_finely_ || by_tiles_alone() || HasManyTiles()) && HasTimeForTiles()) {
     const Result<bool> made = CompareWithTiles(&subspace);
     if (!made.ok()) return made.status();
     if (!*made) return std::optional<Subspace>();
@@ -103,29 +104,83 @@ void SubspaceCandidates::Describe(Subspace* described) const {
     subspace.cues.push_back(DescribeCue(setup->rig, *setup->recorder, setup->totals, cue));
 }
 
+bool SubspaceCandidates::MayBeginWithTiles() const {
+  const TrainOptions& options = setup->options;
+  return options.may_have_cues_by_tile && options.mode == EstimatorMode::kMap && !options.keep_modes &&
+         !options.without.miss_costs && !setup->of_light() && !by_tiles_alone() &&
+         poses->judges.poses() > 0 && HasManyTiles() && setup->limit.left() > setup->limit.elapsed();
+}
+
+Result<std::optional<Subspace>> SubspaceCandidates::OfTilesAlone() {
+  if (modes->still) return std::optional<Subspace>();
+  KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.6));
+  const Result<bool> promising = ChooseTiles();
+  if (!promising.ok()) return promising.status();
+  if (*promising) {
+    Result<PricedTiles> priced = PriceTiles();
+    if (!priced.ok()) return priced.status();
+    priced_tiles_ = std::move(*priced);
+  }
+  began_with_tiles_ = priced_tiles_ && priced_tiles_->cost.misses < kManyMisses;
+  if (!began_with_tiles_) {
+    LeaveTilesAlone();
+    return std::optional<Subspace>();
+  }
+  Subspace subspace;
+  const PricedTiles& taken = *priced_tiles_;  // it stays: calibration may say that they do not serve
+  record->tried = taken.tried;
+  record->tried[taken.best].taken = true;
+  by_tile = true, fine = taken.fine, best_ns_ = taken.cost.ns;
+  subspace = taken.made.subspace, cues.set = taken.made.cues;
+  Describe(&subspace);
+  return std::optional(std::move(subspace));
+}
+
+void SubspaceCandidates::LeaveTilesAlone() {
+  began_with_tiles_ = by_tile = fine = tried_tiles = false;
+  record->tried.clear();
+  cues = {}, poor = {}, cost = {}, best_ns_ = 0;
+  tile_poses_ = poses->poses.TakeAfter(modes_poses_);
+}
+
+Result<PricedTiles> SubspaceCandidates::PriceTiles() {
+  PricedTiles priced;
+  // Their doubts alone judge them; stored finely where poses miss
+  for (const bool finely : {false, true}) {
+    TileSubspace made = OfTiles(finely);
+    if (made.subspace.doubt_inputs() == 0) break;
+    const Result<FrameCost> of = Price(&made.subspace, made.cues);
+    if (!of.ok()) return of.status();
+    priced.tried.push_back(Priced(finely ? kByTileFinely : kByTile, made.cues, of->misses, of->ns));
+    if (of->ns < (finely ? kFinelyLess : 1) * priced.cost.ns) {
+      priced.cost = *of, priced.made = std::move(made), priced.fine = finely;
+      priced.best = priced.tried.size() - 1;
+    }
+    if (!IsWorthTrying(priced.cost) || priced.cost.misses > kHopelessTiles) break;
+  }
+  return priced;
+}
+
 // Of one with cues for all points, and of those with cues of each tile, the cheaper one.
 Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.8));
   const Result<bool> promising = ChooseTiles();
   if (!promising.ok()) return promising.status();
   if (!poor.empty() || (dear && !*promising)) return false;
-  // Their doubts alone judge them; stored finely where poses miss
-  TileSubspace with_tiles;
-  FrameCost of_tiles{.misses = 1, .ns = std::numeric_limits<double>::infinity()};
-  std::size_t best = 0;
-  for (const bool finely : {false, true}) {
-    if (!*promising) break;
-    TileSubspace made = OfTiles(finely);
-    if (made.subspace.doubt_inputs() == 0) break;
-    const Result<FrameCost> priced = Price(&made.subspace, made.cues);
-    if (!priced.ok()) return priced.status();
-    Tried(finely ? kByTileFinely : kByTile, made.cues, priced->misses, priced->ns);
-    if (priced->ns < (finely ? kFinelyLess : 1) * of_tiles.ns) {
-      of_tiles = *priced, with_tiles = std::move(made), fine = finely;
-      best = record->tried.size() - 1;
-    }
-    if (!IsWorthTrying(of_tiles) || of_tiles.misses > kHopelessTiles) break;
+  PricedTiles priced;
+  if (*promising && priced_tiles_) {
+    priced = *std::exchange(priced_tiles_, std::nullopt);
+  } else if (*promising) {
+    Result<PricedTiles> now = PriceTiles();
+    if (!now.ok()) return now.status();
+    priced = std::move(*now);
   }
+  FrameCost& of_tiles = priced.cost;
+  TileSubspace& with_tiles = priced.made;
+  const std::size_t first = record->tried.size();
+  record->tried.insert(record->tried.end(), priced.tried.begin(), priced.tried.end());
+  std::size_t best = first + priced.best;
+  fine = priced.fine;
   if (!steps.ns.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
     poor = PoorTiles(TileErrors(poses->poses, tiles, fits_), setup->options.tolerance, steps);
     if (!poor.empty()) return false;
@@ -162,7 +217,7 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   return true;
 }
 
-double SubspaceCandidates::alike() const { return TileCount() >= kManyTiles ? kAlikeOfMany : kAlikeOfFew; }
+double SubspaceCandidates::alike() const { return HasManyTiles() ? kAlikeOfMany : kAlikeOfFew; }
 
 std::size_t SubspaceCandidates::TileCount() const {
   std::size_t tiles = 0;
@@ -172,7 +227,7 @@ std::size_t SubspaceCandidates::TileCount() const {
 }
 
 Result<double> SubspaceCandidates::LeastForAllPoints() const {
-  if (TileCount() < kManyTiles) return 0.0;
+  if (!HasManyTiles()) return 0.0;
   const Result<double> points = setup->CostOfPoints(cues.set.cues);
   if (!points.ok()) return points.status();
   const double bytes = BytesOfTiles(
@@ -221,17 +276,25 @@ Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
   return Status();
 }
 
-void SubspaceCandidates::Tried(const char* what, const CueSet& of, double misses, double ns) {
-  record->tried.push_back(
-      {what, of.cues.size(), static_cast<std::size_t>(of.rows()), misses, ns / setup->full_cost, false});
+TrainingRecord::Tried SubspaceCandidates::Priced(const char* what, const CueSet& of, double misses,
+                                                 double ns) const {
+  return {what, of.cues.size(), static_cast<std::size_t>(of.rows()), misses, ns / setup->full_cost, false};
 }
 
-Result<bool> SubspaceCandidates::ChooseTiles() {
-  fits_.clear();
+void SubspaceCandidates::Tried(const char* what, const CueSet& of, double misses, double ns) {
+  record->tried.push_back(Priced(what, of, misses, ns));
+}
+
+// Regressions on few cues are glad of more.
+Status SubspaceCandidates::AddPosesForTiles() {
+  if (tile_poses_) {
+    poses->poses.Append(*std::exchange(tile_poses_, std::nullopt));
+    return Status();
+  }
+  modes_poses_ = poses->poses.poses();
   PoseMatrix more(setup->layout);
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
   record->sampled_poses += more.poses();
-  tried_tiles = true;
   ranges_of_tiles = RangeFinder(setup->layout);
   ranges_of_tiles.Widen(more);
   PoseMatrix ends(setup->layout);
@@ -243,21 +306,34 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
     poses->spare->Subtract(modes->pca.mean);
     poses->poses.Append(*std::exchange(poses->spare, std::nullopt));
   }
+  return Status();
+}
+
+Status SubspaceCandidates::FindCandidatesOfTiles() {
+  if (!tile_candidates_.empty()) return Status();
   TileCandidateOptions of;
   of.layout = setup->layout, of.totals = setup->totals, of.signals = setup->recorder->signals();
   of.points = setup->of_tiles, of.positions = modes->positions, of.stages = setup->recorder->candidates();
   Result<std::vector<TileCandidates>> candidates =
       FindTileCandidates(setup->rig, &setup->compiler, setup->trained_clips, of);
   if (!candidates.ok()) return candidates.status();
+  tile_candidates_ = std::move(*candidates);
   if (!poses->learnt.empty()) {
     Result<std::vector<TileCandidates>> learning =
         FindTileCandidates(setup->rig, &setup->compiler, setup->clips, of);
     if (!learning.ok()) return learning.status();
     learning_tiles_ = std::move(*learning);
   }
+  return Status();
+}
+
+Result<bool> SubspaceCandidates::ChooseTiles() {
+  KPSA_RETURN_IF_ERROR(AddPosesForTiles());
+  KPSA_RETURN_IF_ERROR(FindCandidatesOfTiles());
+  tried_tiles = true;
   TileCueOptions choice;
   choice.tolerance = setup->options.tolerance;
-  choice.mean = &modes->pca.mean;
+  choice.mean = &modes->mean;
   choice.turn_reach = kTurnReach * modes->diagonal;
   const auto add = [&](Index scalar) {
     const CueRef cue{CueKind::kScalar, scalar};
@@ -270,18 +346,16 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
     if (!setup->recorder->signals()[s].matrix) add(first[s]);
   }
   if (by_tiles_alone()) {  // all have been tried
-    tiles = kpsa::engine::ChooseTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice);
+    tiles = kpsa::engine::ChooseTiles(modes->pca.mean, poses->poses, tile_candidates_, choice);
     return true;
   }
   TilePromise promise{cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
                       kMostBeyondOfMisses * cues.choice.misses, steps, dear};
   if (dear) promise.most_of_half = kFewBeyond, promise.most_of_whole = 0;
   PromisingTiles chosen =
-      ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice, promise);
+      ChoosePromisingTiles(modes->pca.mean, poses->poses, tile_candidates_, choice, promise, &trial_, &tiles);
   poor = std::move(chosen.poor);
-  if (!chosen.choice) return false;
-  tiles = std::move(*chosen.choice);
-  return true;
+  return chosen.promising;
 }
 
 TileSubspace SubspaceCandidates::OfTiles(bool finely) {

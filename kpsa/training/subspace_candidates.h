@@ -24,22 +24,30 @@ inline constexpr double kTooManyMisses = 0.15;  // and cues as for half the tole
 // who come to the ends of ranges; the bytes are read for sure.
 inline constexpr double kFinelyLess = 0.9;
 
-inline constexpr std::size_t kManyTiles = 64;  // so many: cues of tiles have something to gain
 // Of the cost with cues for all points: those of tiles are taken at less. Judges do not go where clips go: with few
 // tiles clips hit more often than these by cues for all points, with many by cues of tiles.
 inline constexpr double kAlikeOfFew = 0.85, kAlikeOfMany = 1.4;
 
-// Refers to its parts. FindModes has centred the poses.
+// Tiles with cues of their own, the judges' price, and what is told of them.
+struct PricedTiles {
+  TileSubspace made;
+  FrameCost cost = {.misses = 1, .ns = std::numeric_limits<double>::infinity()};
+  bool fine = false;
+  std::vector<TrainingRecord::Tried> tried = {};  // coarse, and fine
+  std::size_t best = 0;                           // of these
+};
+
+// Refers to its parts. CentrePoses has centred the poses.
 struct SubspaceCandidates {
   SubspaceCandidates(TrainingSetup* of_setup, TrainingPoses* of_poses, TrainingModes* of_modes,
-                     TrainingRecord* of_record, double seconds)
-      : setup(of_setup), poses(of_poses), modes(of_modes), record(of_record), modes_seconds(seconds) {}
+                     TrainingRecord* of_record)
+      : setup(of_setup), poses(of_poses), modes(of_modes), record(of_record) {}
 
   TrainingSetup* setup;
   TrainingPoses* poses;
   TrainingModes* modes;
   TrainingRecord* record;
-  double modes_seconds = 0;  // that finding modes took
+  double modes_seconds = 0;  // that finding modes took, or what was made without many
 
   TrainingCues cues = {};
   PatchLayout patches = {};  // what may miss by itself
@@ -64,6 +72,13 @@ struct SubspaceCandidates {
   // What that was expected to cost, at least
   double others_ns = std::numeric_limits<double>::infinity();
 
+  // With many tiles those with cues of their own are made first, of few modes: where few judges miss, what all points would
+  // measure could hardly be so much cheaper that it would be taken, and is not looked for. None where many miss; then what
+  // tiles alone were trained on is set aside.
+  bool MayBeginWithTiles() const;
+  Result<std::optional<Subspace>> OfTilesAlone();
+  void LeaveTilesAlone();  // also where calibration says that they do not serve
+
   // The subspace with which a frame is expected to cost least, by the judges; none where some tiles are poor, or where
   // it is dear and cues of tiles do not serve.
   Result<std::optional<Subspace>> Best();
@@ -71,6 +86,8 @@ struct SubspaceCandidates {
   bool IsWorthTrying(const FrameCost& of) const;
   double alike() const;         // at how much more cues of tiles are taken
   bool by_tiles_alone() const;  // the rig has some tiles before a last step
+  // Nobody knows what all points would measure.
+  bool knows_tiles_only() const { return by_tiles_alone() || began_with_tiles_; }
   // The largest step, and one that can be done without.
   bool HasTimeForTiles();
   Subspace ForAllPoints(bool finely);
@@ -84,15 +101,25 @@ struct SubspaceCandidates {
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
   std::size_t TileCount() const;
+  bool HasManyTiles() const { return TileCount() >= setup->options.many_tiles; }
   // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
   Result<double> LeastForAllPoints() const;
   // False: with nothing.
   Result<bool> CompareWithTiles(Subspace* subspace);
   // With what was cheaper but for its misses, by the judges that compare subspaces.
   Status CompareWithCheaper(Subspace* subspace);
+  TrainingRecord::Tried Priced(const char* what, const CueSet& of, double misses, double ns) const;
   void Tried(const char* what, const CueSet& of, double misses, double ns);
+  Status AddPosesForTiles();
+  Status FindCandidatesOfTiles();
+  Result<PricedTiles> PriceTiles();
 
-  std::vector<TileCandidates> learning_tiles_ = {};
+  std::vector<TileCandidates> tile_candidates_ = {}, learning_tiles_ = {};
+  std::size_t modes_poses_ = 0;           // of the poses, those that modes are found of
+  std::optional<PoseMatrix> tile_poses_;  // the others, where they were set aside
+  TriedTiles trial_ = {};
+  std::optional<PricedTiles> priced_tiles_;
+  bool began_with_tiles_ = false;
   std::vector<TileModel> fits_ = {};  // of `tiles`
   bool for_all_finely_ = false;       // how tiles with cues for all points are stored
   double best_ns_ = 0;                // of what Best has taken so far; 0: not priced

@@ -224,8 +224,9 @@ std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double toleran
 }
 
 PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
-                                    std::vector<TileCandidates> candidates, const TileCueOptions& options,
-                                    const TilePromise& promise) {
+                                    const std::vector<TileCandidates>& candidates,
+                                    const TileCueOptions& options, const TilePromise& promise,
+                                    TriedTiles* trial, TileChoice* choice) {
   const double half = options.tolerance / 2;
   const auto keeps = [&](const Eigen::MatrixXf& errors, std::span<const std::size_t> but = {}) {
     return ShareBeyond(errors, half, but) <= promise.most_of_half ||
@@ -235,24 +236,28 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
   const bool may_be_poor = promise.steps.ns.empty() && !promise.strict;
   bool promising = may_be_poor;
   if (many) {
-    std::vector<TileCandidates> some;
-    for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
-    const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
-    promising = keeps(trial) && ExpectedBeyond(trial, half, kTrialTiles) <= kMostBeyondHalf;
-    if (!promising && may_be_poor) {
-      std::vector<std::size_t> worst = WorstFirst(trial, half);
-      worst.resize((worst.size() + kMayBePoor / 2) / kMayBePoor);
-      promising = keeps(trial, worst) &&
-                  ExpectedBeyond(trial, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
+    if (trial->errors.size() == 0) {
+      std::vector<TileCandidates> some;
+      for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
+      trial->errors = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
     }
-    if (!promising && PoorTiles(trial, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
+    const Eigen::MatrixXf& errors = trial->errors;
+    promising = keeps(errors) && ExpectedBeyond(errors, half, kTrialTiles) <= kMostBeyondHalf;
+    if (!promising && may_be_poor) {
+      std::vector<std::size_t> worst = WorstFirst(errors, half);
+      worst.resize((worst.size() + kMayBePoor / 2) / kMayBePoor);
+      promising = keeps(errors, worst) &&
+                  ExpectedBeyond(errors, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
+    }
+    if (!promising && PoorTiles(errors, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
   }
-  PromisingTiles found{ChooseTiles(mean, poses, std::move(candidates), options), {}};
-  if (promising) return found;
-  const Eigen::MatrixXf errors = TileErrors(poses, *found.choice);
-  if (!many && keeps(errors)) return found;
-  found.poor = PoorTiles(errors, options.tolerance, promise.steps);
-  if (many || promise.strict || !found.poor.empty()) found.choice.reset();
+  if (!trial->chosen) *choice = ChooseTiles(mean, poses, candidates, options);
+  trial->chosen = true;
+  if (promising) return {true, {}};
+  const Eigen::MatrixXf errors = TileErrors(poses, *choice);
+  if (!many && keeps(errors)) return {true, {}};
+  PromisingTiles found{false, PoorTiles(errors, options.tolerance, promise.steps)};
+  found.promising = !many && !promise.strict && found.poor.empty();
   return found;
 }
 

@@ -46,14 +46,21 @@ struct TilePromise {
   bool strict = false;  // also of few tiles
 };
 struct PromisingTiles {
-  std::optional<TileChoice> choice;
-  // Where there is none: the tiles that are to blame (PoorTiles)
+  bool promising = false;
+  // Where they are not: the tiles that are to blame (PoorTiles)
   std::vector<std::size_t> poor = {};
 };
-// The same where an eighth of many tiles says that the others are worth their time.
+// What an earlier question found, of the same poses, candidates and options: errors of some tiles, and the choice.
+struct TriedTiles {
+  Eigen::MatrixXf errors;
+  bool chosen = false;
+};
+// The same where an eighth of many tiles says that the others are worth their time. choice: unchanged where trial has it;
+// mostly not made where tiles are not promising.
 PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
-                                    std::vector<TileCandidates> candidates, const TileCueOptions& options,
-                                    const TilePromise& promise);
+                                    const std::vector<TileCandidates>& candidates,
+                                    const TileCueOptions& options, const TilePromise& promise,
+                                    TriedTiles* trial, TileChoice* choice);
 
 // The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few,
 // one of them has no step, or their steps cost too much. Of the tiles of `steps`, errors has one of `every`; then they may

@@ -57,6 +57,8 @@ struct TrainOptions {
   // Points of all meshes: where there are more, about so many of them say how, and then all are trained
   // (kpsa/training/whole_subspace.h).
   std::size_t many_points = 24'000, some_points = 16'000;
+  // From so many tiles on cues of these are made first, and taken where few judges miss.
+  std::size_t many_tiles = 64;
   // Parts that training does without, to tell what each is worth (bench_ablation --parts).
   struct Without {
     bool relative_matrices = false;  // as cues

@@ -80,35 +80,38 @@ Status ChooseCues(double tolerance, const TrainingPoses& poses, const PoseMatrix
 
 }  // namespace
 
-Status FindModes(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes* modes,
+void CentrePoses(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes* modes,
                  TrainingRecord* record) {
-  const Eigen::VectorXd mean = poses->poses.Mean();
-  MeanShape shape = MeanShapeOf(setup.layout, mean);
+  modes->mean = poses->poses.Mean();
+  MeanShape shape = MeanShapeOf(setup.layout, modes->mean);
   modes->positions = std::move(shape.positions);
-  modes->diagonal = shape.diagonal;
-  poses->poses.Subtract(mean);
-  for (PoseMatrix& learnt : poses->learnt) learnt.Subtract(mean);
+  record->diagonal = modes->diagonal = shape.diagonal;
+  poses->poses.Subtract(modes->mean);
+  for (PoseMatrix& learnt : poses->learnt) learnt.Subtract(modes->mean);
+}
+
+Status FindModes(const TrainingSetup& setup, const TrainingPoses& poses, bool few, TrainingModes* modes,
+                 TrainingRecord* record) {
   PcaOptions pca_options;
   pca_options.seed = setup.options.seed;
   pca_options.max_modes = setup.options.mode == EstimatorMode::kPaper
                               ? static_cast<int>(setup.options.key_points / 2)
                               : setup.options.max_modes;
   if (setup.of_light()) pca_options.max_modes = std::min(pca_options.max_modes, kMaxLightModes);
-  if (!setup.rig.stepped.empty()) {
+  if (few) {
     pca_options.max_modes = std::min(pca_options.max_modes, kFewModes);
     pca_options.method = PcaOptions::Method::kRandomised;  // for so few without the products of all poses
   }
-  Result<Pca> pca = ComputePca(poses->poses, mean, pca_options);
+  Result<Pca> pca = ComputePca(poses.poses, modes->mean, pca_options);
   if (!pca.ok()) return pca.status();
   modes->pca = std::move(*pca);
   modes->still = !setup.of_light() && setup.options.mode == EstimatorMode::kMap &&
                  IsStill(modes->pca, setup.options.tolerance);
   if (modes->still) modes->pca = TruncatedPca(modes->pca, 1);
-  modes->noise = NoiseOf(setup.recorder->signals(), poses->poses, mean, modes->diagonal,
+  modes->noise = NoiseOf(setup.recorder->signals(), poses.poses, modes->mean, modes->diagonal,
                          setup.options.tolerance, setup.of_light());
-  record->diagonal = modes->diagonal;
   record->motion_rms =
-      std::sqrt(modes->pca.total_energy / static_cast<double>(poses->poses.poses() * setup.layout.points));
+      std::sqrt(modes->pca.total_energy / static_cast<double>(poses.poses.poses() * setup.layout.points));
   return Status();
 }
 

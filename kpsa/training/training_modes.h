@@ -10,14 +10,18 @@
 namespace kpsa::engine {
 
 struct TrainingModes {
+  Eigen::VectorXd mean;  // of the poses' columns
   Pca pca;
   CueNoise noise{0};
   std::vector<Double3> positions;  // of all points on the average, and those at stages
   double diagonal = 0;             // of the outputs' box, metres
   bool still = false;              // nothing moves in the space
 };
-// Centres the poses with their mean. Errors: those of ComputePca.
-Status FindModes(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes* modes,
+// Centres the poses with their mean, and says where points are on the average.
+void CentrePoses(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes* modes,
+                 TrainingRecord* record);
+// Of poses that are centred. few: no more than say what moves at all. Errors: those of ComputePca.
+Status FindModes(const TrainingSetup& setup, const TrainingPoses& poses, bool few, TrainingModes* modes,
                  TrainingRecord* record);
 
 struct TrainingCues {

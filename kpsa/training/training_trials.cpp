@@ -6,7 +6,9 @@
 namespace kpsa::engine {
 
 void TrainingTrials::Add(const char* what, double points, CalibratedSubspace tried, double weight) {
-  const double ns = tried.cost.ns + points;
+  // What clips lose counts, where that is more than what poses of all kinds do
+  const double of_clips = tried.cost.lost_of_clips.value_or(0) - tried.cost.lost();
+  const double ns = tried.cost.ns + points + std::max(of_clips, 0.0) * full_;
   tried_.push_back({what, tried.cues.cues.size(), static_cast<std::size_t>(tried.cues.rows()),
                     tried.cost.misses, ns / full_, false});
   const double weighed = weight * (tried.subspace.by_tile() ? ns / alike_ : ns);

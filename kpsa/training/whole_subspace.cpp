@@ -137,7 +137,7 @@ WholeSubspace::WholeSubspace(const TrainingRig& rig, const TrainOptions& options
                              const SubspaceCandidates& some)
     : some_(some),
       setup_(rig, some.setup->clips, options),
-      candidates_(&setup_, some.poses, some.modes, some.record, some.modes_seconds) {}
+      candidates_(&setup_, some.poses, some.modes, some.record) {}
 
 Result<Subspace> WholeSubspace::Make(const RangeFinder& ranges, CalibrationSize size) {
   KPSA_RETURN_IF_ERROR(setup_.Prepare());

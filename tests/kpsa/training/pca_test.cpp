@@ -241,6 +241,10 @@ TEST(PoseMatrix, PosesAreTakenAwayInPlaceAndComeBack) {
   ASSERT_EQ(poses.poses(), 201u);
   EXPECT_EQ(poses.row(200)[4], 199.0f);
   EXPECT_EQ(taken.poses(), 0u);
+  taken = poses.TakeAfter(151);
+  ASSERT_EQ(poses.poses(), 151u);
+  ASSERT_EQ(taken.poses(), 50u);
+  EXPECT_EQ(taken.row(49)[4], 199.0f);
 }
 
 }  // namespace

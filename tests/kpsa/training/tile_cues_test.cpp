@@ -235,9 +235,12 @@ TEST(TileCues, AreGivenUpWhereSomeOfManyLeaveMuch) {
     blind.joints.clear(), blind.points.clear(), blind.own_points = 0;
     std::vector<TileCandidates> tiles(72, told ? tile : blind);
     for (std::size_t t = 0; t < untold; ++t) tiles[8 * t] = blind;
-    return ChoosePromisingTiles(limb.mean, limb.poses, std::move(tiles), options,
-                                {.most_of_half = most_of_half, .most_of_whole = most_of_whole})
-        .choice.has_value();
+    TriedTiles trial;
+    TileChoice choice;
+    return ChoosePromisingTiles(limb.mean, limb.poses, tiles, options,
+                                {.most_of_half = most_of_half, .most_of_whole = most_of_whole}, &trial,
+                                &choice)
+        .promising;
   };
   EXPECT_TRUE(promises(true, 0.03, 0));
   EXPECT_FALSE(promises(false, 0.03, 0));
