@@ -146,10 +146,10 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     if (!patches.ok()) return patches.status();
     candidates.patches = std::move(*patches);
   }
-  const CandidateCalibrator calibrator{&candidates, ranges,
-                                       CalibrationWithin(poses.pose_seconds, options, &setup.limit)};
+  CandidateCalibrator calibrator{&candidates, ranges, {}};
   const auto calibrate = [&](Subspace* subspace) -> Status {
     KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
+    calibrator.size = CalibrationWithin(poses.pose_seconds, options, &setup.limit);
     KPSA_RETURN_IF_ERROR(calibrator.Calibrate(subspace));
     const FrameCost& cost = candidates.cost;
     if (of_points && !options.without.miss_costs && calibrator.size.margins &&
