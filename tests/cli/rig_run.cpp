@@ -165,6 +165,21 @@ std::uint64_t RigRun::Computes(const std::string& node) const {
   return count;
 }
 
+std::size_t HitsOf(const std::string& path, std::shared_ptr<const Subspace> subspace, const std::string& clip,
+                   int frames) {
+  RigRunOptions options;
+  options.subspace = std::move(subspace);
+  options.clip = clip;
+  RigRun run(path, options);
+  EXPECT_TRUE(run.ok()) << run.error;
+  std::size_t hits = 0;
+  for (int f = 0; f < frames && run.ok(); ++f) {
+    run.SetTime(f / 24.0);
+    hits += run.Evaluate().hit;
+  }
+  return hits;
+}
+
 std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, double reach, double speed) {
   std::vector<std::vector<double>> poses;
   for (std::size_t f = 0; f < count; ++f) {

@@ -87,6 +87,10 @@ class RigRun {
   bool has_subspace_ = false;
 };
 
+// How many frames of a clip hit, the first ones, at 24 a second.
+std::size_t HitsOf(const std::string& path, std::shared_ptr<const Subspace> subspace, const std::string& clip,
+                   int frames);
+
 // Poses along a smooth path through the controls' ranges, `reach` times as far as they go.
 std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, double reach,
                                              double speed = 0.37);

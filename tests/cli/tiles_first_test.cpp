@@ -32,16 +32,7 @@ TEST_F(TilesFirst, NothingElseIsLookedForWhereTheyServe) {
   EXPECT_TRUE(trained->by_tile());
   EXPECT_TRUE(IsTried(*trained, kByTile));
   for (const char* what : {kForAllPoints, kFinelyStored, kFewerCues}) EXPECT_FALSE(IsTried(*trained, what));
-  RigRunOptions run;
-  run.subspace = trained;
-  RigRun hello(kHello, run);
-  ASSERT_TRUE(hello.ok()) << hello.error;
-  std::size_t hits = 0;
-  for (int f = 0; f < 24; ++f) {
-    hello.SetTime(f / 24.0);
-    hits += hello.Evaluate().hit;
-  }
-  EXPECT_GT(hits, 20u);
+  EXPECT_GE(HitsOf(kHello, trained, "wave", 24), 22u);
 }
 
 // What was recorded for tiles alone is set aside: modes and cues for all points are those that would have been found anyway.

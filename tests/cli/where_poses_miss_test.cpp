@@ -67,18 +67,9 @@ TEST(WherePosesMiss, ALargerToleranceHitsAsOften) {
     SCOPED_TRACE(tolerance);
     TrainOptions options;
     options.tolerance = tolerance;
-    RigRunOptions run;
-    run.subspace = TrainRig(kHello, options, {"wave"});
-    ASSERT_NE(run.subspace, nullptr);
-    run.clip = "wave";
-    RigRun hello(kHello, run);
-    ASSERT_TRUE(hello.ok()) << hello.error;
-    std::size_t hits = 0;
-    for (int f = 0; f < 24; ++f) {
-      hello.SetTime(f / 24.0);
-      hits += hello.Evaluate().hit;
-    }
-    EXPECT_GE(hits, 22u);
+    const auto trained = TrainRig(kHello, options, {"wave"});
+    ASSERT_NE(trained, nullptr);
+    EXPECT_GE(HitsOf(kHello, trained, "wave", 24), 22u);
   }
 }
 

@@ -50,6 +50,17 @@ double Taken(double by_tile, double for_all, bool tiles_first, double alike) {
   return trials.Take({}).cost.ns;
 }
 
+TEST(TrainingTrials, WhatClipsLoseCountsWhereItIsMore) {
+  TrainingTrials trials(kFullCost, 1);
+  CalibratedSubspace misses_clips = Costing(200, false), hits_them = Costing(250, false);
+  misses_clips.cost.misses = 0.02, misses_clips.cost.lost_of_clips = 0.1;
+  hits_them.cost.misses = 0.02, hits_them.cost.lost_of_clips = 0.01;
+  trials.Add("misses clips", 0, std::move(misses_clips));
+  EXPECT_NEAR(trials.least_ns(), 200 + 0.08 * kFullCost, 1e-9);
+  trials.Add("hits them", 0, std::move(hits_them));
+  EXPECT_EQ(trials.least_ns(), 250) << "less than others is no gain";
+}
+
 TEST(TrainingTrials, CuesOfTilesAreTakenAtTheShareThatIsSaid) {
   ASSERT_TRUE(Costing(1, true).subspace.by_tile());
   ASSERT_FALSE(Costing(1, false).subspace.by_tile());
