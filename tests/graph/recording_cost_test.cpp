@@ -18,7 +18,7 @@ namespace {
 // size of the goal.
 int NodeCount() {
   const char* text = std::getenv("KPSA_RECORDING_NODES");
-  return text == nullptr ? 1000 : std::clamp(std::atoi(text), 200, 100000);
+  return text == nullptr ? 300 : std::clamp(std::atoi(text), 200, 100000);
 }
 
 TEST(InstructionCount, IsExactAndTheSameEveryTime) {
