@@ -41,9 +41,16 @@ double LargestHarmless(const CalibrationPair& pair, double tolerance, double ble
   if (pair.patches.empty() || std::isnan(pair.score))
     return LargestHarmless(pair.score, pair.error, pair.guard, tolerance, blend_start);
   double least = kInfinity;
-  for (const PatchPair& patch : pair.patches)
-    least = std::min(least, LargestHarmless(patch.score, patch.error, std::max(pair.guard, patch.guard),
-                                            tolerance, blend_start));
+  for (const PatchPair& patch : pair.patches) {
+    const double guard = std::max(pair.guard, patch.guard);
+    const double of_all = LargestHarmless(pair.blends_only ? pair.score : patch.score, patch.error, guard,
+                                          tolerance, blend_start);
+    least = std::min(least, of_all);
+    if (!pair.blends_only || of_all == kInfinity || !(of_all > 0)) continue;
+    // Where PatchScoreInBlend reaches the score that takes just enough, which is tau * pair.score / of_all
+    const double own = std::max(patch.score, kLeastOwn * pair.score);
+    least = std::min(least, pair.score + own * (1 - blend_start) * of_all / pair.score);
+  }
   return std::max(least, pair.middle);
 }
 // Below which no point of the pose is accepted.
@@ -126,7 +133,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     severe.push_back(LargestHarmless(pair, kSevere * tolerance, c));
     if (pair.guard == 0 && !std::isnan(pair.score)) kind.scores.push_back(pair.score);
     if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(AcceptedFrom(pair));
-    by_patch = by_patch || !pair.patches.empty();
+    by_patch = by_patch || (!pair.patches.empty() && !pair.blends_only);
     if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
     if (pair.guard == 0 && std::isfinite(pair.score) && pair.kind != static_cast<int>(PoseKind::kBeyond))
       told.push_back({pair.score, !(pair.error <= tolerance)});
@@ -224,9 +231,12 @@ double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& thres
   if (weight == 1) return 0;
   if (pair.patches.empty()) return (1 - weight) * pair.error;
   double error = 0;
-  for (const PatchPair& patch : pair.patches)
-    error = std::max(
-        error, (1 - std::max({pair.guard, patch.guard, FullWeight(patch.score, threshold)})) * patch.error);
+  for (const PatchPair& patch : pair.patches) {
+    const double score =
+        pair.blends_only ? PatchScoreInBlend(patch.score, pair.score, threshold) : patch.score;
+    error = std::max(error,
+                     (1 - std::max({pair.guard, patch.guard, FullWeight(score, threshold)})) * patch.error);
+  }
   return error;
 }
 

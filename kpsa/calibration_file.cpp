@@ -19,10 +19,12 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
   constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
   const std::size_t tiles = s->patches.tiles;
   const double share = s->patches.share;
+  const bool blends_only = s->patches.blends_only;
   s->patches = MakePatchLayout(s->tiles_of_outputs());
   if (s->patches.tiles != tiles)
     return Status::Invalid("patches of {} tiles, expected {}", tiles, s->patches.tiles);
   s->patches.share = share;
+  s->patches.blends_only = blends_only;
   KPSA_RETURN_IF_ERROR(Assign(file.Values<double>(kPatchCosts, {kAny}), &s->patches.costs));
   const Result<std::vector<double>> middles = file.Values<double>(kMiddles, {s->calibration.size()}),
                                     pairs = file.Values<double>(kPatchPairs, {kAny, 2});
@@ -37,6 +39,7 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
   for (std::size_t i = 0; i < s->calibration.size(); ++i) {
     CalibrationPair& pair = s->calibration[i];
     pair.middle = (*middles)[i];
+    pair.blends_only = blends_only;
     if ((*counts)[i] > kMaxPatches || next + (*counts)[i] > pairs->size() / 2)
       return Status::Invalid("calibration pose {} has {} patches", i, (*counts)[i]);
     pair.patches.reserve((*counts)[i]);

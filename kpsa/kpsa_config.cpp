@@ -70,6 +70,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   hasher.AddLong(std::span<const double>(calibration));
   hasher.Add(s.patches.tiles);
   hasher.Add(s.patches.share);
+  hasher.Add(s.patches.blends_only);
   hasher.AddLong(std::span<const double>(s.patches.costs));
   for (const PatchPoints& patch : data_.patches) {
     hasher.Add(patch.output);

@@ -43,6 +43,9 @@ struct PatchLayout {
   // another does not. So where it is too large, all patches are with at least this share of what is too
   // large.
   double share = 1;
+  // Misses are of all points, and patches miss by themselves only in the blend between a hit and a miss: each by
+  // PatchScoreInBlend of its own doubt. `share` does not count.
+  bool blends_only = false;
   std::vector<double> costs;  // of each region, of a full evaluation
   friend bool operator==(const PatchLayout&, const PatchLayout&) = default;
 };

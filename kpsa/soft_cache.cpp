@@ -8,6 +8,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
+
 namespace HWY_NAMESPACE {
 
 // Sums of sixteen are added in halves, whatever the width of the target.
@@ -170,6 +171,12 @@ double FullWeight(double score, const SoftCacheThreshold& threshold) {
   const double lo = threshold.tau_lo();
   if (score <= lo) return 0;
   return Smoothstep((score - lo) / (threshold.tau - lo));
+}
+
+double PatchScoreInBlend(double own, double score, const SoftCacheThreshold& threshold) {
+  const double tau = threshold.tau;
+  if (!(score < tau) || std::isinf(tau)) return score;
+  return std::min(score, std::max(own, kLeastOwn * score) * (tau - threshold.tau_lo()) / (tau - score));
 }
 
 RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g) {

@@ -61,6 +61,13 @@ struct SoftCacheThreshold {
 // Share of the full evaluation at a score.
 double FullWeight(double score, const SoftCacheThreshold& threshold);
 
+// What counts of a patch of points whose own score is `own` where misses are of all points
+// (PatchLayout::blends_only), and a pose's score is `score` >= own: at tau_lo the patch's own, at tau that of the
+// pose, and between them own / (1 - t), t being how far the score is on its way from tau_lo to tau.
+double PatchScoreInBlend(double own, double score, const SoftCacheThreshold& threshold);
+// The least share of a pose's score that counts as a patch's own: all patches come in before tau.
+inline constexpr double kLeastOwn = 0.15;
+
 // The immutable data. Plain arrays: it is stored in the subspace file.
 struct SoftCacheModel {
   EstimatorMode mode = EstimatorMode::kMap;

@@ -302,10 +302,12 @@ Verdict JudgePatches(const Subspace& subspace, const SoftCacheThreshold& thresho
   const double measured = verdict.score;
   const Doubt doubt = LargestDoubt(subspace, y, inputs, doubts);
   if (!scores.empty()) LargestOfPatches(subspace, doubts, scores);
-  for (double& score : scores)
-    score = std::max(measured,
-                     mix.doubt * PatchDoubt(subspace.patches, score, static_cast<double>(doubt.largest)));
   const double score = mix.doubt * static_cast<double>(doubt.largest);
+  for (double& patch : scores)
+    patch = subspace.patches.blends_only
+                ? PatchScoreInBlend(mix.doubt * patch, std::max(measured, score), threshold)
+                : std::max(measured, mix.doubt * PatchDoubt(subspace.patches, patch,
+                                                            static_cast<double>(doubt.largest)));
   if (mix.measured > 0 && !(score > measured)) return verdict;
   verdict.score = score;
   verdict.full_weight = FullWeight(score, threshold);

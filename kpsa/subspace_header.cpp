@@ -68,6 +68,7 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
 
 constexpr char kInner[] = "inner";           // points of an output; missing: none
 constexpr char kStepped[] = "stepped";       // tiles that they are of; missing: all
+constexpr char kInBlends[] = "in blends";    // patchMisses
 constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
 
 // What the space was at rest, and what moves with it.
@@ -173,12 +174,13 @@ int VersionOf(const Subspace& s) {
   const bool held = std::ranges::any_of(s.calibration, [](const CalibrationPair& pair) {
     return pair.kind == static_cast<int>(PoseKind::kHeld);
   });
-  return std::isfinite(s.activity_limit) ? kActivityVersion
-         : held                          ? kHeldVersion
-         : partial                       ? kPartialVersion
-         : !s.mends.empty()              ? kMendsVersion
-         : s.of_inner()                  ? kInnerVersion
-                                         : kListsVersion;
+  return s.patches.blends_only             ? kBlendsVersion
+         : std::isfinite(s.activity_limit) ? kActivityVersion
+         : held                            ? kHeldVersion
+         : partial                         ? kPartialVersion
+         : !s.mends.empty()                ? kMendsVersion
+         : s.of_inner()                    ? kInnerVersion
+                                           : kListsVersion;
 }
 
 }  // namespace
@@ -207,6 +209,7 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
   if (s.patches.tiles > 0) {
     summary["tilesOfPatch"] = s.patches.tiles;
     summary["patchShare"] = s.patches.share;
+    if (s.patches.blends_only) summary["patchMisses"] = kInBlends;
   }
   return {{"kind", kSubspaceKind},     {"version", std::to_string(VersionOf(s))},
           {"summary", summary.dump()}, {"outputs", outputs.dump()},
@@ -242,6 +245,11 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace
   if (summary->contains("tilesOfPatch")) {
     s->patches.tiles = reader.Count("tilesOfPatch", kMaxPoints);
     s->patches.share = reader.Number("patchShare");
+    if (summary->contains("patchMisses")) {
+      s->patches.blends_only = reader.Text("patchMisses") == kInBlends;
+      if (status.ok() && !s->patches.blends_only)
+        return Status::Invalid("summary: \"patchMisses\" should be \"{}\"", kInBlends);
+    }
   }
   for (const Json& entry : *outputs) {
     Reader output("an output", entry, &status);

@@ -157,7 +157,7 @@ Calibrated CalibrateWith(const Calibrator& of, const Guarded& guarded, const std
   if (guarded.chosen.tried.empty()) subspace.score = ScoreOf(subspace, {}, of.full_cost);
   AsChosen(guarded.chosen, subspace, &judges);
   if (!guarded.chosen.trust.empty()) WeighTiles(guarded.chosen.trust, &subspace);
-  if (subspace.patches.tiles == 0) {
+  if (subspace.patches.tiles == 0 || subspace.patches.blends_only) {
     for (TrainedRange& range : subspace.ranges) range.patches = kAllPatches;
   }
   subspace.calibration = PairsOf(subspace, judges);
@@ -221,7 +221,9 @@ std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
                      : rule.score.measured == 0 ? "doubts of tiles"
                                                 : "likeness and doubts of tiles";
   if (rule.weighs && rule.score.doubt > 0) name += " (weighed)";
-  name += rule.tiles > 0 ? fmt::format(", parts of {} tiles", rule.tiles) : ", all points at once";
+  name += rule.in_blends   ? fmt::format(", all points at once, in blends parts of {} tiles", rule.tiles)
+          : rule.tiles > 0 ? fmt::format(", parts of {} tiles", rule.tiles)
+                           : ", all points at once";
   const auto wider = std::ranges::count_if(margins.of_controls, [](double margin) { return margin > 0; });
   if (wider > 0) name += fmt::format(", {} of {} ranges widened", wider, margins.of_controls.size());
   return name;

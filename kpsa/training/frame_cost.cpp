@@ -21,6 +21,7 @@ constexpr double kPartial = 0.4;     // of a full evaluation: what patches cost 
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 // Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
 constexpr double kClearlyLess = 0.95;
+constexpr double kNoWorse = 1.01;    // of the cost of misses of all points: it is none the worse
 constexpr double kFewMisses = 0.02;  // of the judges, by SoftCache's own score: parts are not tried
 constexpr double kOutside = 0.03;    // of a clip's frames, on the average of generated characters
 constexpr double kRowCost = 4;       // ns a row that is measured, likewise
@@ -171,35 +172,53 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
     return ExpectedCost(*subspace, of, points, full, tolerance, confidence);
   };
   PatchLayout patches = std::exchange(subspace->patches, {});
-  std::vector<ScoreJudge> whole;
-  std::ranges::transform(judges, std::back_inserter(whole), WithoutPatches);
+  std::vector<ScoreJudge> whole(judges.begin(), judges.end());
+  JudgeBy({}, &whole);
   const ScoreMix of_all = ScoreOf(*subspace, whole, full);
   subspace->score = of_all;
   FrameCost least = cost(whole);
   const bool weighs = !chosen->trust.empty();
-  chosen->tried.push_back({of_all, 0, weighs, least});
+  chosen->tried.push_back({of_all, 0, false, weighs, least});
+  chosen->taken = 0;
+  if (patches.tiles == 0) return least;
+  PatchLayout taken;
+  const double whole_ns = least.ns, whole_misses = least.misses;
+  const auto take = [&](const FrameCost& with) { least = with, taken = subspace->patches; };
+  subspace->patches = patches;
+  // In blends alone, where parts are cheap: a clip goes there where no judge has been, so what costs judges no more
+  // is taken
+  if (of_all.doubt > 0) {
+    subspace->patches.blends_only = true;
+    std::vector<ScoreJudge> in_blends(judges.begin(), judges.end());
+    JudgeBy(subspace->patches, &in_blends);
+    const FrameCost with = cost(in_blends);
+    chosen->tried.push_back({of_all, patches.tiles, true, weighs, with});
+    if (ArePartial(patches) && with.ns <= kNoWorse * whole_ns) take(with), chosen->taken = 1;
+    subspace->patches.blends_only = false;
+  }
   // SoftCache's own score speaks of all points, and would say of no part that it misses. Where it misses next
   // to nothing, parts could spare next to nothing.
-  if (patches.tiles == 0 || (of_all.measured > 0 && least.misses < kFewMisses)) return least;
+  if (of_all.measured > 0 && whole_misses < kFewMisses) {
+    subspace->patches = taken;
+    return least;
+  }
   const ScoreMix of_parts = of_all.measured > 0 ? DoubtAlone(whole) : of_all;
-  const double bar = of_all.measured > 0 ? kClearlyLess * least.ns : least.ns;
-  PatchLayout taken;
-  MissRule in_parts{of_parts, patches.tiles, weighs, {.ns = std::numeric_limits<double>::infinity()}};
-  subspace->patches = patches;
+  const double bar = of_all.measured > 0 ? kClearlyLess * whole_ns : whole_ns;
+  MissRule in_parts{of_parts, patches.tiles, false, weighs, {.ns = std::numeric_limits<double>::infinity()}};
   subspace->score = of_parts;
   for (const double share : kShares) {
     subspace->patches.share = share;
     const FrameCost with = cost(judges);
     if (with.ns < in_parts.cost.ns) in_parts.cost = with;
     // Of equal ones, since a clip may go where no judge has been
-    if (least.misses == with.misses && !ArePartial(patches)) continue;
-    if (taken.tiles == 0 ? with.ns <= bar : with.ns < least.ns) least = with, taken = subspace->patches;
+    if (whole_misses == with.misses && !ArePartial(patches)) continue;
+    if (taken.tiles == 0 ? with.ns <= bar : with.ns < std::min(bar, least.ns))
+      take(with), chosen->taken = chosen->tried.size();
   }
-  if (taken.tiles == 0) subspace->score = of_all;
-  if (taken.tiles > 0) in_parts.cost = least;
+  if (chosen->taken < chosen->tried.size()) subspace->score = of_all;
+  if (chosen->taken == chosen->tried.size()) in_parts.cost = least;
   subspace->patches = taken;
   chosen->tried.push_back(in_parts);
-  chosen->taken = chosen->tried.size() - (taken.tiles == 0 ? 2 : 1);
   return least;
 }
 
@@ -207,7 +226,7 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
 
 void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<ScoreJudge>* judges) {
   if (!chosen.trust.empty()) WeighDoubts(chosen.trust, subspace, *judges);
-  if (subspace.patches.tiles == 0) std::ranges::transform(*judges, judges->begin(), WithoutPatches);
+  JudgeBy(subspace.patches, judges);
 }
 
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,

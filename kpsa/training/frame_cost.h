@@ -63,8 +63,9 @@ double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
 // What frames may be told to miss by, and what that is expected to cost.
 struct MissRule {
   ScoreMix score;
-  std::size_t tiles = 0;  // of a part that misses by itself; 0: all points miss together
-  bool weighs = false;    // the doubts of tiles, by how far they are believed
+  std::size_t tiles = 0;   // of a part that misses by itself; 0: all points miss together
+  bool in_blends = false;  // parts miss by themselves in blends only
+  bool weighs = false;     // the doubts of tiles, by how far they are believed
   FrameCost cost;
 };
 struct ChosenMisses {

@@ -24,7 +24,9 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
     guarded += asked / static_cast<double>(pose.patches.size());
     if (asked > 0) pair.guard = std::max(pair.guard, kSomeGuard);
     scores.push_back(asked >= 1 ? std::numeric_limits<double>::infinity()
-                                : mix.Of(pose.measured, PatchDoubt(layout, patch.score, pose.doubt)));
+                     : layout.blends_only
+                         ? mix.doubt * patch.score
+                         : mix.Of(pose.measured, PatchDoubt(layout, patch.score, pose.doubt)));
     if (asked < 1) patches.push_back({scores.back(), patch.error, asked});
   }
   pair.guard = std::max(pair.guard, WholeWeight(guarded));
@@ -33,7 +35,8 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
   std::nth_element(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(half - 1), scores.end(),
                    std::greater<>());
   // Guards that ask for so many ask for all points
-  pair.middle = std::isinf(scores[half - 1]) ? pair.score : scores[half - 1];
+  pair.blends_only = layout.blends_only;
+  pair.middle = layout.blends_only || std::isinf(scores[half - 1]) ? pair.score : scores[half - 1];
   pair.patches = OutstandingPatches(std::move(patches));
   return pair;
 }

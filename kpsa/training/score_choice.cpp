@@ -24,6 +24,11 @@ ScoreMix DoubtAlone(std::span<const ScoreJudge> judges) {
   return {0, doubt > 0 && std::isfinite(1 / doubt) ? 1 / doubt : 1};
 }
 
+void JudgeBy(const PatchLayout& patches, std::vector<ScoreJudge>* judges) {
+  if (patches.tiles > 0 && !patches.blends_only) return;
+  std::ranges::transform(*judges, judges->begin(), patches.tiles == 0 ? WithoutPatches : WithGuardsOfAll);
+}
+
 double ShareOfFull(const ScoreJudge& judge, const ScoreMix& mix, const SoftCacheThreshold& threshold,
                    const PatchLayout& patches) {
   const JudgedPose& pose = judge.pose;
@@ -34,8 +39,10 @@ double ShareOfFull(const ScoreJudge& judge, const ScoreMix& mix, const SoftCache
   if (pose.patches.empty()) return 1;
   PatchChoice choice;
   for (std::size_t p = 0; p < pose.patches.size(); ++p) {
-    choice.weights[p] = static_cast<float>(
-        FullWeight(mix.Of(pose.measured, PatchDoubt(patches, pose.patches[p].score, pose.doubt)), threshold));
+    choice.weights[p] = static_cast<float>(FullWeight(
+        patches.blends_only ? PatchScoreInBlend(mix.doubt * pose.patches[p].score, score, threshold)
+                            : mix.Of(pose.measured, PatchDoubt(patches, pose.patches[p].score, pose.doubt)),
+        threshold));
     if (!guards.empty()) choice.weights[p] = std::max(choice.weights[p], guards[p]);
   }
   ChooseRegions(patches, judge.guard, &choice);

@@ -19,13 +19,19 @@ struct ScoreJudge {
   std::vector<float> guards_of_patches = {};  // what guards ask for of single patches; empty: nothing
 };
 // Where no patch misses by itself.
-inline ScoreJudge WithoutPatches(ScoreJudge judge) {
+inline ScoreJudge WithGuardsOfAll(ScoreJudge judge) {
   for (const float asked : judge.guards_of_patches)
     judge.guard = std::max(judge.guard, static_cast<double>(asked));
   judge.guards_of_patches.clear();
+  return judge;
+}
+inline ScoreJudge WithoutPatches(ScoreJudge judge) {
+  judge = WithGuardsOfAll(std::move(judge));
   judge.pose.patches.clear();
   return judge;
 }
+// As patches miss: guards speak of all points unless these miss by themselves.
+void JudgeBy(const PatchLayout& patches, std::vector<ScoreJudge>* judges);
 
 // What a pose costs of a full evaluation: nothing for a hit, 1 for a miss, or for a blend of all points; what
 // its patches cost, where these miss by themselves.

@@ -46,7 +46,7 @@ Result<std::vector<std::size_t>> UntoldControls(TrainingSetup* setup, const CueS
       entries.emplace_back(row.begin(), row.end());
     }
     AskGuards(subspace.ranges, guarded, entries, subspace.patches.patches, &judges);
-    if (subspace.patches.tiles == 0) std::ranges::transform(judges, judges.begin(), WithoutPatches);
+    JudgeBy(subspace.patches, &judges);
     const std::vector<CalibrationPair> pairs = PairsOf(subspace, judges);
     std::vector<std::size_t> wrong(2 * some.size(), 0);  // by end
     for (std::size_t t = 0; t < pairs.size(); ++t) {

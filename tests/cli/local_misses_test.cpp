@@ -5,6 +5,7 @@
 #include <numeric>
 #include <random>
 
+#include "files/safetensors.h"
 #include "graph/frames.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
@@ -164,6 +165,42 @@ TEST_F(LocalMisses, DoNotDependOnWhatTheFullEvaluationIsAPartOf) {
     partly += of_regions[f].full_weight > 0 && of_regions[f].full_weight < kWholeFrom;
   }
   EXPECT_GT(partly, 10u);
+}
+
+// Misses of all points, whose blends leave alone what is hardly doubted.
+TEST_F(LocalMisses, InBlendsOnlyAreMissesOfAllPointsElsewhere) {
+  const auto whole = WithThreshold(*pure_, 0.8 * tau_, tau_);
+  auto in_blends = std::make_shared<Subspace>(*cheap_);
+  in_blends->patches.blends_only = true;
+  ASSERT_TRUE(ValidateSubspace(*in_blends).ok()) << ValidateSubspace(*in_blends).ToString();
+  const std::vector<RunFrame> frames = Frames(in_blends), of_all = Frames(whole);
+  std::size_t hits = 0, misses = 0, spared = 0;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    SCOPED_TRACE(f);
+    EXPECT_EQ(frames[f].hit, of_all[f].hit);
+    EXPECT_EQ(frames[f].score, of_all[f].score);
+    EXPECT_GE(frames[f].full_weight == 1, of_all[f].full_weight == 1);
+    hits += frames[f].hit, misses += frames[f].full_weight == 1;
+    if (frames[f].hit || frames[f].full_weight == 1) {
+      EXPECT_TRUE(SameBytes(frames[f].points, frames[f].hit ? reconstructed_[f] : exact_[f]));
+      continue;
+    }
+    const std::size_t count = frames[f].points.size() / 3;
+    std::size_t alone = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      bool same = true;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const float from = At(reconstructed_[f], i, a), at = At(frames[f].points, i, a);
+        same = same && at == from;
+        ASSERT_LE(std::fabs(at - from), std::fabs(At(exact_[f], i, a) - from) + 2e-7f) << i;
+      }
+      alone += same;
+    }
+    spared += alone > count / 4;
+  }
+  EXPECT_GT(hits, 15u);
+  EXPECT_GT(misses, 10u);
+  EXPECT_GT(spared, 3u) << "of blends";
 }
 
 // Points that the full side of the mush has computed, which is what a miss costs most.
@@ -403,6 +440,16 @@ TEST_F(LocalMisses, AFileKeepsThemAndDamageIsRefused) {
     EXPECT_EQ(read->calibration[i].patches, held->calibration[i].patches);
     EXPECT_EQ(read->calibration[i].middle, held->calibration[i].middle);
   }
+  EXPECT_FALSE(read->calibration[3].blends_only);
+  auto in_blends = std::make_shared<Subspace>(*held);
+  in_blends->patches.blends_only = true;
+  ASSERT_TRUE(WriteSubspace(*in_blends, folder / "blends.kpsa").ok());
+  const Result<Subspace> blends = ReadSubspace(folder / "blends.kpsa");
+  ASSERT_TRUE(blends.ok()) << blends.status().ToString();
+  EXPECT_EQ(blends->patches, in_blends->patches);
+  EXPECT_TRUE(blends->calibration[3].blends_only);
+  EXPECT_EQ(*SafetensorsFile::Read(folder / "blends.kpsa")->Metadata("version"),
+            std::to_string(kBlendsVersion));
   const auto refused = [&](const auto& damage, const char* word) {
     Subspace damaged = *held;
     damage(&damaged);

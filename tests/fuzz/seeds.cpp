@@ -128,6 +128,9 @@ void WriteSubspaces(const std::string& folder) {
   s.calibration = {{0.5, 1e-4, 0, 0}};
   s.calibration[0].patches.assign(s.patches.patches, {0.1, 1e-4});
   Check(WriteSubspace(s, folder + "/patches.kpsa"));
+  s.patches.blends_only = true;
+  s.calibration[0].middle = s.calibration[0].score;
+  Check(WriteSubspace(s, folder + "/blends.kpsa"));
 }
 
 }  // namespace

@@ -305,6 +305,89 @@ TEST(Patches, CalibrationCountsWhatTheyEmit) {
   }
 }
 
+TEST(Patches, InBlendsGoFromTheirOwnScoresToThatOfAllPoints) {
+  SoftCacheThreshold threshold;
+  threshold.tau = 2;
+  const double lo = threshold.tau_lo();
+  for (const double own : {0.0, 0.2, 0.7, 1.0}) {
+    EXPECT_NEAR(PatchScoreInBlend(own * lo, lo, threshold), std::max(own, kLeastOwn) * lo, 1e-12);
+    EXPECT_EQ(PatchScoreInBlend(own * 2, 2, threshold), 2);
+    EXPECT_EQ(PatchScoreInBlend(own * 3, 3, threshold), 3);
+    double before = 0, weight = 0;
+    for (double score = lo; score < 2.1; score += 1e-4) {
+      const double of_patch = PatchScoreInBlend(own * score, score, threshold);
+      EXPECT_GE(of_patch, before);
+      EXPECT_LE(of_patch, score);
+      EXPECT_LE(FullWeight(of_patch, threshold) - weight, 0.05) << "no jump at " << score;
+      before = of_patch, weight = FullWeight(of_patch, threshold);
+    }
+    EXPECT_EQ(weight, 1);
+  }
+  // A lower tau never takes less of the full evaluation
+  for (double tau = 0.9; tau < 1.3; tau += 1e-3) {
+    SoftCacheThreshold one, lower;
+    one.tau = tau, lower.tau = tau - 1e-3;
+    EXPECT_GE(FullWeight(PatchScoreInBlend(0.6, 1, lower), lower),
+              FullWeight(PatchScoreInBlend(0.6, 1, one), one));
+  }
+  EXPECT_EQ(FullWeight(PatchScoreInBlend(1, 1, {kInfinity}), {kInfinity}), 0);
+  EXPECT_EQ(FullWeight(PatchScoreInBlend(0, 1, {-1}), {-1}), 1);
+}
+
+// Pose by pose at the threshold found, and no threshold above it would do.
+TEST(Patches, CalibrationCountsWhatTheyEmitInBlends) {
+  const ScoreMix mix{0, 2};
+  PatchLayout layout;
+  layout.blends_only = true;
+  const std::vector<ScoreJudge> judges = RandomJudges(1500, 9, 3);
+  std::vector<CalibrationPair> pairs;
+  for (const ScoreJudge& judge : judges)
+    pairs.push_back(PairOf(judge.pose, mix, layout, judge.guard, judge.kind));
+  std::size_t helped = 0;
+  for (const double tolerance : {1e-3, 2e-3, 3e-3}) {
+    const Calibration found = Calibrate(pairs, tolerance, 0.05);
+    SCOPED_TRACE(tolerance);
+    ASSERT_GT(found.threshold.tau, 0);
+    const auto violations = [&](const SoftCacheThreshold& threshold, bool check) {
+      std::size_t count = 0;
+      for (std::size_t t = 0; t < judges.size(); ++t) {
+        const JudgedPose& pose = judges[t].pose;
+        double error = 0, whole = 0, least = 1;
+        for (const PatchPair& patch : pose.patches) {
+          const double score = PatchScoreInBlend(2 * patch.score, 2 * pose.doubt, threshold),
+                       weight = std::max(judges[t].guard, FullWeight(score, threshold));
+          error = std::max(error, (1 - weight) * patch.error);
+          least = std::min(least, weight);
+          whole = std::max(
+              whole, (1 - std::max(judges[t].guard, FullWeight(2 * pose.doubt, threshold))) * patch.error);
+        }
+        if (check) {
+          EXPECT_NEAR(EmittedError(pairs[t], threshold), error, 1e-15) << t;
+          EXPECT_GE(error, whole);
+          EXPECT_EQ(EmittedWeight(pairs[t], threshold) < 1, least < 1) << t;
+          helped += error > whole;
+        }
+        count += least < 1 && error > tolerance * (1 + 1e-9);
+      }
+      return count;
+    };
+    EXPECT_EQ(violations(found.threshold, true), found.violations);
+    SoftCacheThreshold above = found.threshold;
+    for (const double more : {1.02, 1.1, 1.3}) {
+      above.tau = more * found.threshold.tau;
+      EXPECT_GE(violations(above, false), found.violations);
+    }
+    // Never more than the blend's width below that of misses of all points
+    std::vector<CalibrationPair> of_all;
+    for (const ScoreJudge& judge : judges)
+      of_all.push_back(PairOf(WithoutPatches(judge).pose, mix, {}, judge.guard, judge.kind));
+    const double whole = Calibrate(of_all, tolerance, 0.05).threshold.tau;
+    EXPECT_LE(found.threshold.tau, whole * (1 + 1e-12));
+    EXPECT_GE(found.threshold.tau, kBlendStart * whole);
+  }
+  EXPECT_GT(helped, 50u) << "some patches of blends are left alone";
+}
+
 // Guards of patches are no hits, and no worse than it is counted.
 TEST(Patches, CalibrationCountsGuardsOfPatches) {
   const ScoreMix mix{0, 2};
@@ -436,11 +519,12 @@ TEST(Patches, AreTakenWhereTheySpareTime) {
   EXPECT_LT(told_cost.wrong, 0.01);
   // Patches that cost as much as all points, or that do not tell, are no gain
   EXPECT_EQ(choose(OneWrongPatch(5, 0.3), 0.9).first.tiles, 0u);
-  EXPECT_EQ(choose(OneWrongPatch(5, 0.001), 0.1).first.tiles, 0u);
+  EXPECT_TRUE(choose(OneWrongPatch(5, 0.001), 0.1).first.blends_only) << "all points miss";
   // Where no judge misses, clips may: as cautious as can be
   const auto [none, none_cost] = choose(OneWrongPatch(100000, 1), 0.1);
   EXPECT_GT(none.tiles, 0u);
   EXPECT_EQ(none.share, 0.15);
+  EXPECT_FALSE(told.blends_only);
   EXPECT_LT(none_cost.misses, 1e-3) << "of the sets that are drawn of them some have the wrong one often";
 }
 
