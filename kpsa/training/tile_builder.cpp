@@ -119,11 +119,13 @@ Eigen::MatrixXd TargetOf(const PoseMatrix& poses, std::size_t first, std::size_t
 }
 
 // Where more is left out anyway than the budget of a tile, that is the budget.
-TileOptions OwnOptions(const TileOptions& options, double left_out) {
+TileOptions OwnOptions(const TileOptions& options, const TileModel& model) {
   TileOptions own = options;
+  own.rms_budget *= model.of_budget, own.max_budget *= model.of_budget;
   if (!(options.left_out_share > 0)) return own;
-  own.rms_budget = std::max(options.rms_budget, options.left_out_share * std::sqrt(left_out));
-  own.max_budget *= own.rms_budget / options.rms_budget;
+  const double least = own.rms_budget;
+  own.rms_budget = std::max(least, options.left_out_share * std::sqrt(model.left_out));
+  own.max_budget *= own.rms_budget / least;
   return own;
 }
 
@@ -194,7 +196,7 @@ void TileBuilder::Add(std::size_t tiles, const std::function<TileModel(std::size
   ParallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const TileModel model = models(t);
-      const TileOptions own = OwnOptions(options, model.left_out);
+      const TileOptions own = OwnOptions(options, model);
       TileFactors& factors = made_->factors[first + t];
       factors = FactorModel(model, inputs.samples, components_, own, true);
       made_->joint_rows[first + t] = model.joint_rows;

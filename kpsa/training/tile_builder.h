@@ -51,6 +51,7 @@ struct TileModel {
   Eigen::MatrixXd gain;                   // [3n x |columns|]
   Eigen::MatrixXd covariance;             // of these columns
   double left_out = 0;                    // variance of a point that they do not tell
+  double of_budget = 1;                   // how much of the budgets it has
   std::vector<std::uint32_t> joint_rows;  // where the tile lies in the space of a joint: those of its matrix
   double joint_scale = 1;                 // of that joint: the tile lies there as if it had none (JointScale)
   Eigen::VectorXd mean;                   // [3n], there; empty: as BuildTiles has it

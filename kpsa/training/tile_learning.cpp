@@ -185,6 +185,7 @@ TileSubspace TeachTiles(const TileSubspace& made, std::span<const char> taught, 
       fitted.target.colwise() += shift;
       for (Index e = 0; e < 12 && joint != kNoIndex; ++e) fitted.joint_rows.push_back(row_of.at(joint + e));
       if (joint != kNoIndex) fitted.joint_scale = JointScale(poses, training.cues.mean, joint);
+      fitted.of_budget = BudgetOfTile(next.subspace.outputs[m], t);
       return fitted;
     };
     TileData known = map.data();

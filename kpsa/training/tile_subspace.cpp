@@ -17,6 +17,7 @@
 namespace kpsa::engine {
 namespace {
 
+constexpr double kBeforeStep = 0.4;     // of the budgets of a tile that gives what a last step reads
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
 // Of the poses, that any tile is expected to leave beyond half the tolerance: with more, doubts tell too few apart
@@ -261,6 +262,13 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
   return found;
 }
 
+double BudgetOfTile(const SubspaceOutput& output, std::size_t tile) {
+  if (output.inner == 0) return 1;
+  const bool stepped = output.stepped.empty() || (tile + 1) * kTilePoints > output.points ||
+                       std::ranges::binary_search(output.stepped, static_cast<Index>(tile));
+  return stepped ? kBeforeStep : 1;
+}
+
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
                               const TileChoice& choice, std::vector<SubspaceOutput> outputs,
                               const TileOptions& options, std::vector<TileModel>* fits) {
@@ -275,14 +283,16 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
   if (fits != nullptr) fits->resize(choice.candidates.size());
   std::size_t tile = 0, first = 0;
   for (const SubspaceOutput& output : s.outputs) {
+    const auto fit = [&](std::size_t k) {
+      if (fitted) return WithTarget((*fits)[k], poses, choice, k);
+      TileModel made_now = ModelOf(choice, k, poses, choice.candidates[k], choice.options);
+      if (fits != nullptr) (*fits)[k] = WithoutTarget(&made_now);
+      return made_now;
+    };
     const auto model = [&](std::size_t t) {
-      const std::size_t k = tile + t;
-      if (!fitted) {
-        TileModel made_now = ModelOf(choice, k, poses, choice.candidates[k], choice.options);
-        if (fits != nullptr) (*fits)[k] = WithoutTarget(&made_now);
-        return made_now;
-      }
-      return WithTarget((*fits)[k], poses, choice, k);
+      TileModel made_now = fit(tile + t);
+      made_now.of_budget = BudgetOfTile(output, t);
+      return made_now;
     };
     const std::size_t height = output.reconstructed() * static_cast<std::size_t>(s.components);
     inputs.first_column = first;

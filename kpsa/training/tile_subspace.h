@@ -90,6 +90,10 @@ double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size
 // The fewest tiles, the worst first, but for which that is at most `most`; ascending.
 std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most);
 
+// How much of the budgets tile `tile` of an output has (TileModel::of_budget): less where it gives what a last step reads,
+// since the frames that the step turns details with are of differences of neighbours.
+double BudgetOfTile(const SubspaceOutput& output, std::size_t tile);
+
 // The first clip_poses of the same poses are of clips. The caller fills what MakeSubspace's does. fits: by tile, without
 // their targets, what the tiles were fitted to the first time, whatever is stored of it; empty: this is the first time.
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,

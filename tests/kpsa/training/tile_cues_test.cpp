@@ -117,6 +117,32 @@ TEST(TileCues, FitsServeTilesThatAreStoredInAnotherWay) {
   EXPECT_TRUE(std::ranges::equal(again.mean.span(), anew.mean.span()));
 }
 
+// What a last step reads is stored more finely, tile by tile.
+TEST(TileCues, BeforeALastStepErrorsCountMore) {
+  const Limb limb(true);
+  const TileOptions coarse{.rms_budget = 0.1 * kLimbTolerance, .max_budget = 0.5 * kLimbTolerance},
+      fine{.rms_budget = 0.04 * kLimbTolerance, .max_budget = 0.2 * kLimbTolerance};
+  const auto stored = [&](const TileOptions& options, std::size_t inner, std::vector<Index> stepped) {
+    SubspaceOutput output{"limb@mush", kLimbPoints, "mush", inner};
+    output.stepped = std::move(stepped);
+    const TileSubspace made = MakeTileSubspace(limb.mean, limb.poses, 0, limb.choice, {output}, options);
+    const TileData& data = made.subspace.tiles[0].data();
+    return std::pair(data.ranks[0] + 256 * data.counts[0], data.ranks[1] + 256 * data.counts[1]);
+  };
+  const auto as_coarse = stored(coarse, 0, {}), as_fine = stored(fine, 0, {});
+  ASSERT_NE(as_coarse.first, as_fine.first);
+  ASSERT_NE(as_coarse.second, as_fine.second);
+  EXPECT_EQ(stored(coarse, kLimbPoints, {}), as_fine);
+  EXPECT_EQ(stored(coarse, kLimbPoints, {1}), std::pair(as_coarse.first, as_fine.second));
+  EXPECT_EQ(stored(coarse, kLimbPoints, {0}), std::pair(as_fine.first, as_coarse.second));
+  EXPECT_EQ(BudgetOfTile({"m@mush", 2 * kTilePoints + 5, "mush", 0}, 2), 1);
+  SubspaceOutput some{"m@mush", 2 * kTilePoints + 5, "mush", 3 * kTilePoints};
+  some.stepped = {0};
+  EXPECT_LT(BudgetOfTile(some, 0), 1);
+  EXPECT_EQ(BudgetOfTile(some, 1), 1);
+  EXPECT_EQ(BudgetOfTile(some, 2), BudgetOfTile(some, 0)) << "it holds inner points, too";
+}
+
 TEST(TileCues, ALimbIsToldInTheSpaceOfItsJoint) {
   const Limb limb(true);
   for (const Index joint : limb.chosen.joint)
