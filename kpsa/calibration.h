@@ -48,8 +48,8 @@ struct CalibrationPair {
   // (AllWeight).
   std::vector<PatchPair> patches = {};
   double middle = 0;
-  bool blends_only =
-      false;                // PatchLayout::blends_only: patches have their own scores, `middle` is the pose's
+  // PatchLayout::blends_only: patches have their own scores, and `middle` is that of the pose.
+  bool blends_only = false;
   bool near_clips = false;  // SampledPose::near_clips, of the sampled kind: hits of these are those to expect
 };
 // Keeps what CalibrationPair::patches says, of the patches of a pose in any order.

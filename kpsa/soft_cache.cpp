@@ -8,7 +8,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
-
 namespace HWY_NAMESPACE {
 
 // Sums of sixteen are added in halves, whatever the width of the target.
