@@ -48,9 +48,9 @@ struct CalibrationPair {
   // (AllWeight).
   std::vector<PatchPair> patches = {};
   double middle = 0;
+  bool near_clips = false;  // SampledPose::near_clips, of the sampled kind: hits of these are those to expect
   // PatchLayout::blends_only: patches have their own scores, and `middle` is that of the pose.
   bool blends_only = false;
-  bool near_clips = false;  // SampledPose::near_clips, of the sampled kind: hits of these are those to expect
 };
 // Keeps what CalibrationPair::patches says, of the patches of a pose in any order.
 std::vector<PatchPair> OutstandingPatches(std::vector<PatchPair> patches);
