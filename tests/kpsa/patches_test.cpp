@@ -334,7 +334,7 @@ TEST(Patches, InBlendsGoFromTheirOwnScoresToThatOfAllPoints) {
   EXPECT_EQ(FullWeight(PatchScoreInBlend(0, 1, {-1}), {-1}), 1);
 }
 
-// Pose by pose at the threshold found, and no threshold above it would do.
+// Pose by pose at the threshold found; and that is where one pose more would go beyond the tolerance.
 TEST(Patches, CalibrationCountsWhatTheyEmitInBlends) {
   const ScoreMix mix{0, 2};
   PatchLayout layout;
@@ -372,11 +372,10 @@ TEST(Patches, CalibrationCountsWhatTheyEmitInBlends) {
       return count;
     };
     EXPECT_EQ(violations(found.threshold, true), found.violations);
+    for (const Calibration::Kind& kind : found.kinds) EXPECT_LE(kind.upper_bound, 0.05 + 1e-9);
     SoftCacheThreshold above = found.threshold;
-    for (const double more : {1.02, 1.1, 1.3}) {
-      above.tau = more * found.threshold.tau;
-      EXPECT_GE(violations(above, false), found.violations);
-    }
+    above.tau *= 1 + 1e-6;
+    EXPECT_GT(violations(above, false), found.violations);
     // Never more than the blend's width below that of misses of all points
     std::vector<CalibrationPair> of_all;
     for (const ScoreJudge& judge : judges)
