@@ -17,8 +17,8 @@ class BadSubspaces : public RefusalTest {
  protected:
   static void SetUpTestSuite() {
     const TemporaryFolder trained;
-    const ProcessResult run = RunKpsa({"train", kHelloFolder + "hello.yaml", "--samples", "80", "--rows",
-                                       "12", "-q", "-o", trained / "h.kpsa"});
+    const ProcessResult run = RunKpsa({"train", kHelloFolder + "hello.yaml", "--force", "--samples", "80",
+                                       "--rows", "12", "-q", "-o", trained / "h.kpsa"});
     EXPECT_EQ(run.exit_code, 0) << run.err;
     good_ = new std::string(TemporaryFolder::Read(trained / "h.kpsa"));
     ASSERT_GT(good_->size(), 1000u);

@@ -302,7 +302,7 @@ TEST(Acceleration, FirstFiveMinutes) {
   Ok({"init", kHelloGlb, "-o", rig});
   Ok({"validate", rig});
   EXPECT_EQ(RunKpsa({"bench", rig}).exit_code, 3) << "no subspace yet";
-  const Json trained = OkJson({"train", rig, "--samples", "120", "--json", "-q"});
+  const Json trained = OkJson({"train", rig, "--force", "--samples", "120", "--json", "-q"});
   EXPECT_TRUE(std::filesystem::exists(subspace));
   EXPECT_GT(trained["cues"], 0);
   EXPECT_GE(trained["check"]["worst_poses"].size(), 1u);
@@ -420,7 +420,7 @@ TEST(Render, ACameraSeesLightAfterBounces) {
                 .err.find("16 x 6"),
             std::string::npos);
 
-  Ok({"train", path, "--rows", "90", "--modes", "12", "--calibration", "40", "--keep-modes"});
+  Ok({"train", path, "--force", "--rows", "90", "--modes", "12", "--calibration", "40", "--keep-modes"});
   const Json bench = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "1000", "--json"}));
   EXPECT_EQ(bench["points"], 400);
   EXPECT_GT(bench["hit_rate"], 0.5);

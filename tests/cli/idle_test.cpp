@@ -94,7 +94,7 @@ TEST_F(Idle, BenchAndReportTell) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   };
-  run({"train", folder.rig(), "--samples", "100", "--calibration", "60", "-q"});
+  run({"train", folder.rig(), "--force", "--samples", "100", "--calibration", "60", "-q"});
   const std::string text = run({"bench", folder.rig(), "--runs", "1", "-q", "--idle"});
   EXPECT_NE(text.find("% of the full cost makes less than 0.5 mm on 48 frames"), std::string::npos) << text;
   EXPECT_NE(text.find("still"), std::string::npos) << text;

@@ -160,7 +160,7 @@ TEST_F(Travelling, PlacingTheSpaceKeepsTheSubspace) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   };
-  run({"train", "hello.yaml", "-q", "--tolerance", "10mm"});
+  run({"train", "hello.yaml", "--force", "-q", "--tolerance", "10mm"});
   const auto report = nlohmann::json::parse(run(
       {"eval", "hello.yaml", "--accelerate", "--set", "lower.translateX=5000", "-o", "far.npz", "--json"}));
   EXPECT_EQ(report["accelerated"]["misses"], 0) << report.dump();

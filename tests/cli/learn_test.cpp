@@ -15,7 +15,7 @@ class Learning : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_.AddSway();
-    const ProcessResult trained = Run({"train", "hello.yaml", "--keep-modes", "-q"});
+    const ProcessResult trained = Run({"train", "hello.yaml", "--force", "--keep-modes", "-q"});
     ASSERT_EQ(trained.exit_code, 0) << trained.err;
   }
   ProcessResult Run(const std::vector<std::string>& arguments) const {

@@ -33,7 +33,7 @@ class PageReport : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new HelloFolder;
-    const ProcessResult trained = RunKpsa({"train", folder_->rig(), "-q"});
+    const ProcessResult trained = RunKpsa({"train", folder_->rig(), "--force", "-q"});
     ASSERT_EQ(trained.exit_code, 0) << trained.err;
   }
   static void TearDownTestSuite() { delete folder_; }

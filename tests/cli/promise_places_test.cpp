@@ -53,7 +53,7 @@ class Places : public ::testing::Test {
   static const TemporaryFolder& Trained() {
     static const HelloFolder* const folder = [] {
       auto* made = new HelloFolder;
-      Run(*made, {"train", "hello.yaml", "-q"});
+      Run(*made, {"train", "hello.yaml", "--force", "-q"});
       return made;
     }();
     return *folder;
@@ -119,7 +119,7 @@ TEST_F(Places, AnArmatureOfScaleAHundredIsTrainedInTheWorldsLengths) {
     folder.Edit("members: all}", "members: all, parent: lower}");
     const std::string tolerance = std::to_string(kTolerance * scale);
     folder.Edit("tolerance: 0.5mm", "tolerance: " + tolerance + "m");
-    Run(folder, {"train", "hello.yaml", "-q"});
+    Run(folder, {"train", "hello.yaml", "--force", "-q"});
     const Told told = Compare(folder, "hello.yaml");
     EXPECT_GT(told.hits, 20u) << told.reason;
     EXPECT_GT(told.worst, 0.01 * kTolerance * scale) << "errors are lengths in the world";
@@ -132,7 +132,7 @@ TEST_F(Places, AJointOfTheChainIsGuardedWherePointsStayBehind) {
   const HelloFolder folder;
   folder.Edit("  upper.rotateX: {min: -30, max: 30}\n", "");
   folder.Edit("subspace: hello.kpsa", "space: upper, subspace: hello.kpsa");
-  Run(folder, {"train", "hello.yaml", "-q"});
+  Run(folder, {"train", "hello.yaml", "--force", "-q"});
   // "wave" turns upper about an axis that was never trained
   const Told told = Compare(folder, "hello.yaml", {"--clip", "wave"});
   EXPECT_GT(told.frames, told.hits);
@@ -144,7 +144,7 @@ TEST_F(Places, AJointOfTheChainIsGuardedWherePointsStayBehind) {
 TEST_F(Places, ADeformerInTheWorldsAxesGuardsTheWholeChain) {
   const HelloFolder folder;
   folder.Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
-  Run(folder, {"train", "hello.yaml", "-q"});
+  Run(folder, {"train", "hello.yaml", "--force", "-q"});
   const Told told =
       Compare(folder, "hello.yaml", {"--rest", "--set", "lower.translateX=10", "--set", "upper.rotateZ=-60"});
   EXPECT_EQ(told.accepted, 0u);
@@ -172,10 +172,10 @@ TEST_F(Places, AnyToleranceAcceptsWhatIsFinite) {
 
 TEST_F(Places, TheSameTrainingGivesTheSameBytes) {
   const HelloFolder folder;
-  Run(folder, {"train", "hello.yaml", "-q", "-o", "a.kpsa", "--threads", "1"});
-  Run(folder, {"train", "hello.yaml", "-q", "-o", "b.kpsa", "--threads", "3"});
+  Run(folder, {"train", "hello.yaml", "--force", "-q", "-o", "a.kpsa", "--threads", "1"});
+  Run(folder, {"train", "hello.yaml", "--force", "-q", "-o", "b.kpsa", "--threads", "3"});
   EXPECT_TRUE(TemporaryFolder::Read(folder / "a.kpsa") == TemporaryFolder::Read(folder / "b.kpsa"));
-  Run(folder, {"train", "hello.yaml", "-q", "-o", "c.kpsa", "--seed", "2"});
+  Run(folder, {"train", "hello.yaml", "--force", "-q", "-o", "c.kpsa", "--seed", "2"});
   EXPECT_FALSE(TemporaryFolder::Read(folder / "a.kpsa") == TemporaryFolder::Read(folder / "c.kpsa"));
 }
 
@@ -225,7 +225,8 @@ TEST_F(Driven, AMeshAndTheMeshThatItDrivesAreAcceleratedInAnyOrder) {
   for (const std::string& entries : {tube + sheet, sheet + tube}) {
     const HelloFolder folder;
     Write(folder, entries);
-    for (const char* name : {"tube", "cloth"}) Run(folder, {"train", "hello.yaml", "-q", "--name", name});
+    for (const char* name : {"tube", "cloth"})
+      Run(folder, {"train", "hello.yaml", "--force", "-q", "--name", name});
     const Told told = Compare(folder, "hello.yaml");
     EXPECT_EQ(told.frames, 49u);
     EXPECT_GT(told.hits, 10u) << told.reason;
@@ -236,7 +237,7 @@ TEST_F(Driven, AMeshAndTheMeshThatItDrivesAreAcceleratedInAnyOrder) {
 TEST_F(Driven, OneEntryMayHoldBoth) {
   const HelloFolder folder;
   Write(folder, Entry("both", "column@mush, sheet@soft"));
-  Run(folder, {"train", "hello.yaml", "-q"});
+  Run(folder, {"train", "hello.yaml", "--force", "-q"});
   const Told told = Compare(folder, "hello.yaml");
   EXPECT_EQ(told.frames, 49u);
   EXPECT_GT(told.hits, 30u) << told.reason;

@@ -45,7 +45,8 @@ class Stale : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     const SubspaceFolder folder;
-    const ProcessResult run = folder.Run({"train", "hello.yaml", "--samples", "150", "--rows", "30", "-q"});
+    const ProcessResult run =
+        folder.Run({"train", "hello.yaml", "--force", "--samples", "150", "--rows", "30", "-q"});
     ASSERT_EQ(run.exit_code, 0) << run.err;
     trained_ = TemporaryFolder::Read(folder / "hello.kpsa");
   }
@@ -267,10 +268,11 @@ TEST_F(Stale, TrainingWithMoreThreadsGivesTheSameSubspace) {
   std::vector<std::string> results;
   for (const char* threads : {"1", "3"}) {
     const SubspaceFolder folder;
-    ASSERT_EQ(
-        folder.Run({"train", "hello.yaml", "--samples", "150", "--rows", "30", "--threads", threads, "-q"})
-            .exit_code,
-        0);
+    ASSERT_EQ(folder
+                  .Run({"train", "hello.yaml", "--force", "--samples", "150", "--rows", "30", "--threads",
+                        threads, "-q"})
+                  .exit_code,
+              0);
     for (const char* evaluating : {"1", "4"}) {
       ASSERT_EQ(folder
                     .Run({"eval", "hello.yaml", "--accelerate", "--tolerance", "any", "--threads", evaluating,
@@ -302,7 +304,7 @@ TEST(StaleShapes, AChangedShapeIsRefusedByName) {
               "displacements}], 'weight[elbow]': 1}\n");
   folder.Edit("[skin, cage, mush]", "[skin, fix, cage, mush]");
   const auto run = [&](std::vector<std::string> arguments) { return RunKpsa(arguments, 60, folder.path()); };
-  ASSERT_EQ(run({"train", "hello.yaml", "--samples", "100", "--rows", "20", "-q"}).exit_code, 0);
+  ASSERT_EQ(run({"train", "hello.yaml", "--force", "--samples", "100", "--rows", "20", "-q"}).exit_code, 0);
   const auto eval = [&] { return run({"eval", "hello.yaml", "--accelerate", "--frames", "0:1", "-o", "-"}); };
   EXPECT_EQ(eval().exit_code, 0) << eval().err;
   write(0.01f, 0.5f);

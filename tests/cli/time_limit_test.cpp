@@ -71,12 +71,13 @@ TEST(TimeLimits, ThatAreLongEnoughChangeNothing) {
 TEST(TimeLimits, AreSecondsAndWhatTheyLeftOutIsTold) {
   const HelloFolder folder;
   for (const char* time : {"0", "-3s", "soon", "2mm"}) {
-    const ProcessResult run = RunKpsa({"train", "hello.yaml", "--time", time}, 60, folder.path());
+    const ProcessResult run = RunKpsa({"train", "hello.yaml", "--force", "--time", time}, 60, folder.path());
     EXPECT_EQ(run.exit_code, 2) << time;
     EXPECT_NE(run.err.find("--time \"" + std::string(time) + "\": expected seconds"), std::string::npos)
         << run.err;
   }
-  const ProcessResult run = RunKpsa({"train", "hello.yaml", "--time", "0.000001s", "-q"}, 60, folder.path());
+  const ProcessResult run =
+      RunKpsa({"train", "hello.yaml", "--force", "--time", "0.000001s", "-q"}, 60, folder.path());
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("in the time and memory given: 250 of "), std::string::npos) << run.out;
 }

@@ -20,7 +20,7 @@ class Tolerances : public ::testing::Test {
   }
   static void SetUpTestSuite() {
     folder_ = std::make_unique<HelloFolder>();
-    trained_ = Run({"train", "hello.yaml", "--speedup", "0.9", "--json", "-q"});
+    trained_ = Run({"train", "hello.yaml", "--force", "--speedup", "0.9", "--json", "-q"});
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static inline std::unique_ptr<HelloFolder> folder_;
@@ -133,8 +133,8 @@ TEST(TrainNothing, AStackThatCostsLittleIsTrainedByForceOnly) {
   folder.Edit("  mush: {type: deltaMush, iterations: 10}\n", "");
   folder.Edit("variants:\n  light: {mush.envelope: 0}\n", "");
   const auto train = [&](std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"train", "hello.yaml",    "-q", "--samples",
-                                          "60",    "--calibration", "40"};
+    std::vector<std::string> arguments = {"train",     "hello.yaml", "--force",       "-q",
+                                          "--samples", "60",         "--calibration", "40"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunKpsa(arguments, 60, folder.path());
   };

@@ -170,7 +170,7 @@ TEST_F(Tripwire, TheProgramReportsItAsNeverEvaluated) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   };
-  run({"train", "hello.yaml", "-q", "--tolerance",
+  run({"train", "hello.yaml", "--force", "-q", "--tolerance",
        "10mm"});  // so much that nothing behind the mush is measured
   const auto never = [&](const std::string& tolerance) {
     const auto bench = nlohmann::json::parse(
@@ -197,7 +197,7 @@ TEST_F(Tripwire, StaysAsleepWherePointsBehindTheMushAreMeasured) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   };
-  run({"train", "hello.yaml", "-q"});
+  run({"train", "hello.yaml", "--force", "-q"});
   const auto bench = nlohmann::json::parse(run({"bench", "hello.yaml", "--runs", "1", "--json", "-q"}));
   std::vector<std::string> stages = bench["cue_stages"];
   EXPECT_TRUE(std::any_of(stages.begin(), stages.end(), [](const std::string& s) {
