@@ -133,8 +133,8 @@ TEST(TrainNothing, AStackThatCostsLittleIsTrainedByForceOnly) {
   folder.Edit("  mush: {type: deltaMush, iterations: 10}\n", "");
   folder.Edit("variants:\n  light: {mush.envelope: 0}\n", "");
   const auto train = [&](std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"train",     "hello.yaml", "--force",       "-q",
-                                          "--samples", "60",         "--calibration", "40"};
+    std::vector<std::string> arguments = {"train", "hello.yaml",    "-q", "--samples",
+                                          "60",    "--calibration", "40"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunKpsa(arguments, 60, folder.path());
   };
