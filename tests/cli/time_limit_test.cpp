@@ -71,7 +71,7 @@ TEST(TimeLimits, ThatAreLongEnoughChangeNothing) {
 TEST(TimeLimits, AreSecondsAndWhatTheyLeftOutIsTold) {
   const HelloFolder folder;
   for (const char* time : {"0", "-3s", "soon", "2mm"}) {
-    const ProcessResult run = RunKpsa({"train", "hello.yaml", "--force", "--time", time}, 60, folder.path());
+    const ProcessResult run = RunKpsa({"train", "hello.yaml", "--time", time}, 60, folder.path());
     EXPECT_EQ(run.exit_code, 2) << time;
     EXPECT_NE(run.err.find("--time \"" + std::string(time) + "\": expected seconds"), std::string::npos)
         << run.err;
