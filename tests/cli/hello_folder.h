@@ -30,6 +30,8 @@ class HelloFolder : public TemporaryFolder {
   // The files of scenes/hello.
   static std::string Yaml();
   static std::string Glb();
+  // Its column five times: what one takes is too little to be worth training on a fast machine.
+  static std::string Columns();
   // Writes hello.yaml with one place changed; its path.
   std::string Edit(const std::string& from, const std::string& to) const {
     return Write("hello.yaml", Replaced(Read(*this / "hello.yaml"), from, to));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -77,7 +78,7 @@ class ReadmeTest : public ::testing::Test {
     fs::create_directory(folder_ / "build");
     fs::create_symlink(KPSA_PROGRAM, folder_ / "build/kpsa");
     fs::create_directory_symlink(KPSA_SCENES_DIR, folder_ / "scenes");
-    fs::copy_file(KPSA_SCENES_DIR "/hello/hello.glb", folder_ / "CHAR.glb");
+    folder_.Write("CHAR.glb", HelloFolder::Columns());
   }
   // One entry for each line that does not do what it says.
   std::vector<std::string> Problems(const std::string& markdown) const {
