@@ -12,7 +12,7 @@ endfunction()
 
 # Rooms that read, write and report more than they compute. Without optimisation they compile in two fifths of the time, which a
 # build that runs the tests once never gains back
-set(KPSA_READERS files rig gltf host report view cli)
+set(KPSA_READERS files rig gltf scenes kpsa host report view cli)
 # With a little of it in two thirds: these are as fast with that as with all (loading a rig, training), and share a precompiled header
 set(KPSA_TALKERS rig host report view cli promise untouched growth)
 
@@ -33,7 +33,7 @@ function(kpsa_library name)
 endfunction()
 
 function(kpsa_compile_together target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 16)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 40)
   foreach(source ${ARGN})
     file(STRINGS ${source} targets REGEX "foreach_target|<Eigen/(QR|SVD|Cholesky|Eigenvalues)>" LIMIT_COUNT 1)
     if(targets)  # they compile themselves once a target; and the longest ones had better run beside others

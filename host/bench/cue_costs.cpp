@@ -7,17 +7,17 @@
 namespace kpsa::engine {
 namespace {
 
-using Row = KpsaConfig::Row;
+using CueRow = KpsaConfig::Row;
 
 // The same node may put points together as well as deform them.
 std::string StepKey(const Plan& plan, Index step) {
   return std::string(plan.step_name(step)) + '/' + plan.step_label(step);
 }
 
-double NumbersOf(const KpsaConfig::Data& data, const Row& row) {
-  if (row.kind == Row::Kind::kPoint) return 3;
-  if (row.kind != Row::Kind::kProduct) return 1;
-  return data.products[row.input].b.kind == Row::Kind::kPoint ? 1 : 2;
+double NumbersOf(const KpsaConfig::Data& data, const CueRow& row) {
+  if (row.kind == CueRow::Kind::kPoint) return 3;
+  if (row.kind != CueRow::Kind::kProduct) return 1;
+  return data.products[row.input].b.kind == CueRow::Kind::kPoint ? 1 : 2;
 }
 
 // Points of the mesh, or shading points, on which a cue lies.
@@ -61,7 +61,7 @@ void CueCosts::Load(const Rig& rig, const Plan& plan, const std::vector<AppliedS
     std::map<Index, Stage> by_input;
     for (std::size_t r = 0; r < data.rows.size(); ++r) {
       numbers_[a].push_back(NumbersOf(data, data.rows[r]));
-      if (data.rows[r].kind == Row::Kind::kPoint) by_input[data.rows[r].input].cues.push_back(r);
+      if (data.rows[r].kind == CueRow::Kind::kPoint) by_input[data.rows[r].input].cues.push_back(r);
     }
     for (auto& [input, stage] : by_input) {
       stage.subspace = a;

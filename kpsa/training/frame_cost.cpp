@@ -21,10 +21,10 @@ constexpr double kPartial = 0.4;     // of a full evaluation: what patches cost 
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 // Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
 constexpr double kClearlyLess = 0.95;
-constexpr double kNoWorse = 1.01;    // of the cost of misses of all points: it is none the worse
-constexpr double kFewMisses = 0.02;  // of the judges, by SoftCache's own score: parts are not tried
-constexpr double kOutside = 0.03;    // of a clip's frames, on the average of generated characters
-constexpr double kRowCost = 4;       // ns a row that is measured, likewise
+constexpr double kNoWorse = 1.01;         // of the cost of misses of all points: it is none the worse
+constexpr double kFewWholeMisses = 0.02;  // of the judges, by SoftCache's own score: parts are not tried
+constexpr double kOutsideClips = 0.03;    // of a clip's frames, on the average of generated characters
+constexpr double kRowCost = 4;            // ns a row that is measured, likewise
 // Sets of as many judges, drawn of them anew: where a few poses decide, others would decide otherwise
 constexpr int kDraws = 8;
 constexpr std::uint64_t kDrawSeed = 0x9b05688c2b3e6c1full;
@@ -160,7 +160,7 @@ double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
     cost.misses += ShareOfFull(outside[j], subspace.score, threshold, subspace.patches);
     cost.wrong += IsWrong(pairs[j], threshold, tolerance) ? 1 : 0;
   }
-  return kOutside * full * cost.lost() / static_cast<double>(outside.size());
+  return kOutsideClips * full * cost.lost() / static_cast<double>(outside.size());
 }
 
 namespace {
@@ -198,7 +198,7 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
   }
   // SoftCache's own score speaks of all points, and would say of no part that it misses. Where it misses next
   // to nothing, parts could spare next to nothing.
-  if (of_all.measured > 0 && whole_misses < kFewMisses) {
+  if (of_all.measured > 0 && whole_misses < kFewWholeMisses) {
     subspace->patches = taken;
     return least;
   }

@@ -12,7 +12,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr double kMargins[] = {1.0 / 3, 1.0 / 6};  // of the range, the larger one first
-constexpr double kOutside = 1.0 / 12;              // how far clips go beyond, where they do
+constexpr double kClipOvershoot = 1.0 / 12;        // how far clips go beyond, where they do
 constexpr std::size_t kOutsidePoses = 4;           // of each joint
 constexpr std::size_t kPoses = 12;                 // that try a joint, each at its ends and beyond
 constexpr std::size_t kMostPoses = 1600;           // of all joints: where there are many, fewer try each,
@@ -21,7 +21,6 @@ constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends
 constexpr double kMoreMisses = 0.01;               // of the poses, than expected: narrower margins are tried
 constexpr double kClearlyCheaper = 0.95;  // of what a frame costs with the best so far: they are taken
-constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kSeed = 0x510e527fade682d1ull;
 
 using Joint = std::vector<std::size_t>;  // controls
@@ -103,10 +102,11 @@ class MarginFinder {
       if (wider->of_controls != found.sets.back().of_controls) found.sets.push_back(std::move(*wider));
     }
     if (found.sets.size() == 1) return found;
-    Result<std::vector<Tried>> outside = Try(all, kOutside, std::min(kOutsidePoses, each_));
+    Result<std::vector<Tried>> outside = Try(all, kClipOvershoot, std::min(kOutsidePoses, each_));
     if (!outside.ok()) return outside.status();
     for (Tried& of_joint : *outside) {
-      for (JudgedPose& pose : of_joint.poses) found.outside.push_back({std::move(pose), 0, kBeyond});
+      for (JudgedPose& pose : of_joint.poses)
+        found.outside.push_back({std::move(pose), 0, static_cast<int>(PoseKind::kBeyond)});
       std::ranges::move(of_joint.entries, std::back_inserter(found.entries));
     }
     return found;

@@ -9,11 +9,11 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kTurn = 0.02;   // radians, about (1, 1, 1)
-constexpr double kShift = 1e-3;  // of the diagonal, along (1, 1, 1)
-constexpr double kRaise = 0.01;  // of a value
-constexpr double kSafety = 1.7;  // a point on the tried axis moves less than about another one
-constexpr double kLeast = 1e-6;  // metres a unit: what moves nothing at rest may move something elsewhere
+constexpr double kTriedTurn = 0.02;  // radians, about (1, 1, 1)
+constexpr double kShift = 1e-3;      // of the diagonal, along (1, 1, 1)
+constexpr double kRaise = 0.01;      // of a value
+constexpr double kSafety = 1.7;      // a point on the tried axis moves less than about another one
+constexpr double kLeast = 1e-6;      // metres a unit: what moves nothing at rest may move something elsewhere
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class Prober {
@@ -106,7 +106,7 @@ Result<std::vector<double>> FindReach(const TrainingRig& rig, Compiler* compiler
       continue;
     }
     Result<double> turn = diagonal, move = kSafety;
-    if (!free[s].rotate.empty()) turn = tried(free[s].rotate, kTurn / std::sqrt(3.0), kTurn);
+    if (!free[s].rotate.empty()) turn = tried(free[s].rotate, kTriedTurn / std::sqrt(3.0), kTriedTurn);
     if (!free[s].translate.empty()) move = tried(free[s].translate, shift, kShift * diagonal);
     if (!turn.ok()) return turn.status();
     if (!move.ok()) return move.status();

@@ -10,7 +10,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kProbedPoses = 256, kLeastPosesWithin = 250;
-constexpr std::size_t kSpared = 4;
+constexpr std::size_t kOneSparedOf = 4;
 constexpr double kOfGram = 8;  // training without cues of tiles, in Gram matrices of its poses
 
 }  // namespace
@@ -56,8 +56,8 @@ bool FitIntoTime(PoseMatrix* poses, std::size_t* of_clips, std::size_t not_recor
 std::optional<PoseMatrix> SpareForModes(PoseMatrix* poses, std::size_t* of_clips, double most_work) {
   const auto count = static_cast<double>(poses->poses());
   if (count * count * static_cast<double>(poses->columns()) <= most_work) return std::nullopt;
-  PoseMatrix spare = poses->TakeEvery(kSpared);
-  *of_clips -= *of_clips / kSpared;
+  PoseMatrix spare = poses->TakeEvery(kOneSparedOf);
+  *of_clips -= *of_clips / kOneSparedOf;
   return spare;
 }
 

@@ -24,6 +24,7 @@ test('the processor draws what a GPU draws', async () => {
   const take = async (name, change) => {
     pictures[name] = [];
     for (const {page} of pages) {
+      await page.bringToFront();  // what is behind another page draws once a second
       await page.evaluate(() => window.kpsa.setFrame(26, 'bend'));
       await change(page);
       await page.evaluate(() => document.activeElement?.blur());
