@@ -35,7 +35,7 @@ endfunction()
 function(kpsa_compile_together target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 40)
   foreach(source ${ARGN})
-    file(STRINGS ${source} targets REGEX "foreach_target|<Eigen/(QR|SVD|Cholesky|Eigenvalues)>" LIMIT_COUNT 1)
+    file(STRINGS ${source} targets REGEX "foreach_target" LIMIT_COUNT 1)
     if(targets)  # they compile themselves once a target; and the longest ones had better run beside others
       set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     endif()

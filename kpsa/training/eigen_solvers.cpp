@@ -18,11 +18,6 @@ Eigen::MatrixXd ThinQ(const Eigen::MatrixXd& tall) {
   return qr.householderQ() * Eigen::MatrixXd::Identity(tall.rows(), tall.cols());
 }
 
-Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
-                                  const Eigen::Ref<const Eigen::MatrixXd>& b) {
-  return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
-}
-
 constexpr int kMostPasses = 8;
 constexpr double kOrthogonal = 1e-8;  // of a unit vector: what may lie within; rounding after the last pass
 constexpr Eigen::Index kSmall = 160;  // below this the dense solver is as fast

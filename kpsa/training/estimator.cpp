@@ -17,11 +17,6 @@ namespace {
 
 constexpr std::size_t kSurveyBytes = 192'000'000;  // of estimates at a time
 
-Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
-                                  const Eigen::Ref<const Eigen::MatrixXd>& b) {
-  return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
-}
-
 Eigen::VectorXd Reach(const Eigen::MatrixXd& gain) {
   if (gain.rows() == 0) return Eigen::VectorXd::Zero(gain.cols());
   return gain.cwiseAbs().colwise().maxCoeff().transpose();

@@ -49,6 +49,11 @@ void MultiplyFloats(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd*
 Eigen::MatrixXd MultiplyFloats(const GemmOperand& a, const GemmOperand& b);
 // a * a^T, symmetric to the last bit.
 Eigen::MatrixXd Gram(const GemmOperand& a);
+// a^T * b
+inline Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                                         const Eigen::Ref<const Eigen::MatrixXd>& b) {
+  return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
+}
 // rows * rows^T, and a * b^T: of values by poses.
 inline Eigen::MatrixXd GramOf(const Eigen::MatrixXd& rows) { return Gram(GemmOperand::Dense(rows)); }
 inline Eigen::MatrixXd CrossOf(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {

@@ -24,7 +24,7 @@ constexpr double kExplained = 0.98;        // of what all products explain that 
 constexpr std::size_t kMostProducts = 15;  // as far as so many can
 constexpr double kRidge[] = {1e-3, 1e-2, 1e-1, 1};  // of a product's variance
 constexpr double kExtraShare = 0.3;  // of the RMS budget: what the directions of products may leave out
-constexpr double kByte = 127;
+constexpr double kProductByte = 127;
 
 class ProductFitter {
  public:
@@ -167,7 +167,8 @@ class ProductFitter {
     if (extra > 0) {
       Eigen::MatrixXd columns = eigen.vectors.leftCols(extra);
       for (Eigen::Index k = 0; k < extra; ++k)
-        columns.col(k) = (columns.col(k) * (kByte / columns.col(k).cwiseAbs().maxCoeff())).array().round();
+        columns.col(k) =
+            (columns.col(k) * (kProductByte / columns.col(k).cwiseAbs().maxCoeff())).array().round();
       const Eigen::MatrixXd more = onto(columns, rest);
       const Eigen::Index k = f_.u.cols();
       f_.u.conservativeResize(Eigen::NoChange, k + extra);
