@@ -266,7 +266,7 @@ Result<bool> MeasureLoading(const std::string& path) {
   const Result<Costs> full = MeasureRig(path);
   if (!full.ok()) return full.status();
   double loading[2] = {1e9, 1e9}, compile = 1e9;
-  for (int run = 0; run < 4 * kRuns; ++run) {
+  for (int run = 0; run < 16 * kRuns; ++run) {
     Flags flags;
     flags.file = path;
     const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);

@@ -149,7 +149,7 @@ namespace {
 
 // For a while only: large pages may hold more than the file.
 AlignedFloats MemoryFor(std::size_t file_size) {
-  const std::size_t unit = file_size >= kLargePage / 4 ? kLargePage : 64;
+  const std::size_t unit = file_size >= kLargePage ? kLargePage : 64;
   return AlignedFloats::Uninitialized((file_size + unit - 1) / unit * unit / sizeof(float));
 }
 

@@ -1,7 +1,9 @@
 #include "graph/compiler.h"
 
 #include <map>
+#include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "graph/authored.h"
 #include "graph/builtin_steps.h"
@@ -166,6 +168,8 @@ struct Compiler::Impl {
   using RestOutputs = ByDigest<std::shared_ptr<const StaticEvaluator::Outputs>>;
   ByDigest<BoundKernel> kernels;
   RestOutputs rest;
+  // Which deformers touch which points, as they were asked since the last compilation began, and before that
+  ByDigest<std::optional<bool>> touches, earlier_touches;
   CompileStats stats;
 
   // A kernel that was bound before, or one that is bound now and kept.
@@ -197,6 +201,16 @@ struct Compiler::Impl {
         return Result<BoundKernel>(BoundKernel());
       Digest key;
       return KernelOf(table, statics, digests, instance, sets, &key);
+    });
+    statics.RememberTouches([&](Index instance, const PointSet& points) -> std::optional<bool>& {
+      Hasher hasher;
+      hasher.Add(digests[instance]);
+      hasher.Add(points.digest());
+      const Digest key = hasher.Finish();
+      std::optional<bool>& known = touches[key];
+      if (const auto it = earlier_touches.find(key); !known.has_value() && it != earlier_touches.end())
+        known = it->second;
+      return known;
     });
   }
   RestOutputs RestOf(const InstanceTable& table, StaticEvaluator& statics, const RestDigests& digests) {
@@ -249,6 +263,7 @@ Result<std::shared_ptr<const Plan>> Compiler::CompileOrThrow(const Graph& graph,
   std::unique_ptr<RestDigests> digests;
   if (binds) {
     digests = std::make_unique<RestDigests>(table, order);
+    impl_->earlier_touches = std::exchange(impl_->touches, {});
     impl_->Share(table, statics, *digests);
   }
   Result<PlanDraft> draft = DraftPlan(table, statics, wanted, request);

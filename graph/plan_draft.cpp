@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/check.h"
-#include "graph/authored.h"
 #include "graph/static_eval.h"
 
 namespace kpsa::engine {
@@ -151,10 +150,7 @@ class Drafter {
         table_.graph().def(instance.node).stateful)
       return nullptr;
     const ComputeGroup& group = table_.group(instance);
-    const StructuralView view(table_, instance.node, instance.geometry, &instance, &statics_);
-    if (CallAuthored(table_, instance.node, [&] { return group.touches(view, points); }) &&
-        !RestsAtZero(instance, group.strength_input))
-      return nullptr;
+    if (statics_.Touches(number, points) && !RestsAtZero(instance, group.strength_input)) return nullptr;
     const auto input = std::ranges::find(instance.inputs, group.touched_input, &Input::position);
     return input == instance.inputs.end() ? nullptr : &input->source;
   }

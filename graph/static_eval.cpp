@@ -6,7 +6,9 @@
 
 #include "base/cancel.h"
 #include "base/check.h"
+#include "graph/authored.h"
 #include "graph/step_shape.h"
+#include "graph/structural_view.h"
 
 namespace kpsa::engine {
 namespace {
@@ -142,6 +144,17 @@ void StaticEvaluator::TellOfFailure(const std::string& plug) {
     told.Add(std::move(error));
   }
   status_ = std::move(told);
+}
+
+bool StaticEvaluator::Touches(Index number, const PointSet& points) {
+  std::optional<bool>* const known = touch_memo_ ? &touch_memo_(number, points) : nullptr;
+  if (known != nullptr && known->has_value()) return **known;
+  const Instance& instance = table_.instances()[number];
+  const StructuralView view(table_, instance.node, instance.geometry, &instance, this);
+  const bool touches =
+      CallAuthored(table_, instance.node, [&] { return table_.group(instance).touches(view, points); });
+  if (known != nullptr && status_.ok()) *known = touches;
+  return touches;
 }
 
 Status StaticEvaluator::Run(Index number, bool rest) {

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -23,6 +24,11 @@ class StaticEvaluator final : public StaticValues {
   // What binds kernels; as Bind of graph/node_binding unless set.
   using Binder = std::function<Result<BoundKernel>(Index instance, const InstanceSets& sets)>;
   void BindBy(Binder binder) { binder_ = std::move(binder); }
+  // Whether a deformer touches any of the points, as its node says (ComputeGroup::touches).
+  bool Touches(Index instance, const PointSet& points);
+  // Where such answers are kept, and found, if they are those of an earlier compilation.
+  using TouchMemo = std::function<std::optional<bool>&(Index instance, const PointSet& points)>;
+  void RememberTouches(TouchMemo memo) { touch_memo_ = std::move(memo); }
   // Rest values that are known already (from an earlier compilation), by instance.
   using Outputs = std::vector<std::vector<Value>>;  // by output position and element
   void SetRest(Index instance, std::shared_ptr<const Outputs> outputs) {
@@ -44,6 +50,7 @@ class StaticEvaluator final : public StaticValues {
   bool told_ = false;  // which plug it leaves without a value
   Index evaluated_ = 0;
   Binder binder_;
+  TouchMemo touch_memo_;
 };
 
 // The points of `set` out of a complete array.

@@ -13,14 +13,26 @@
 namespace kpsa::engine {
 namespace {
 
-Result<Signal> FindSignal(const Graph& graph, const std::string& name, const RigWithin& within) {
-  Result<PlugRef> plug = graph.FindPlug(within.prefix + name);
-  if (!plug.ok() && !within.prefix.empty()) plug = graph.FindPlug(name);  // time
-  if (!plug.ok()) return plug.status();
-  Signal signal{graph.PlugName(*plug), *plug, graph.PlugType(*plug) == Type::kMatrix,
-                IsWorldMatrix(graph, *plug)};
-  return signal;
-}
+// Signals by what a subspace calls them, each looked up once: many cues are entries of the same one.
+class NamedSignals {
+ public:
+  NamedSignals(const Graph& graph, const RigWithin& within) : graph_(graph), within_(within) {}
+  Result<const Signal*> Find(const std::string& name) {
+    const auto known = found_.find(name);
+    if (known != found_.end()) return &known->second;
+    Result<PlugRef> plug = graph_.FindPlug(within_.prefix + name);
+    if (!plug.ok() && !within_.prefix.empty()) plug = graph_.FindPlug(name);  // time
+    if (!plug.ok()) return plug.status();
+    Signal signal{graph_.PlugName(*plug), *plug, graph_.PlugType(*plug) == Type::kMatrix,
+                  IsWorldMatrix(graph_, *plug)};
+    return &found_.emplace(name, std::move(signal)).first->second;
+  }
+
+ private:
+  const Graph& graph_;
+  const RigWithin& within_;
+  std::unordered_map<std::string, Signal> found_;
+};
 
 // The value of a signal at rest, by entries.
 Status RestEntries(const Graph& graph, Compiler* compiler, const Signal& signal, double entries[12]) {
@@ -126,8 +138,7 @@ std::set<Index> CarriedNodes(const Graph& graph, const AccelerationTarget& targe
 }
 
 // The world matrices that cues are measured by: what turns their transforms is guarded, also where it moves no point.
-std::vector<PlugRef> MatricesRead(const Graph& graph, const AccelerationTarget& target,
-                                  const Subspace& subspace) {
+std::vector<PlugRef> MatricesRead(const Subspace& subspace, NamedSignals* named) {
   std::set<std::string> names;
   for (const CueDescription& cue : subspace.cues) {
     if (cue.kind == CueDescription::Kind::kScalar) names.insert(SplitEntryName(cue.plug).signal);
@@ -135,8 +146,8 @@ std::vector<PlugRef> MatricesRead(const Graph& graph, const AccelerationTarget& 
   }
   std::vector<PlugRef> plugs;
   for (const std::string& name : names) {
-    const Result<Signal> signal = FindSignal(graph, name, target.within);
-    if (signal.ok() && signal->relative) plugs.push_back(signal->plug);
+    const Result<const Signal*> signal = named->Find(name);
+    if (signal.ok() && (*signal)->relative) plugs.push_back((*signal)->plug);
   }
   return plugs;
 }
@@ -159,15 +170,15 @@ std::vector<PlugRef> SplittablePoints(const Graph& graph, const AccelerationTarg
 
 // Guards of what varies or is set here: with its trained range, or, if it never moved there, its rest value.
 Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
-                 const Subspace& subspace, const std::vector<SetHere>& set_here, AccelerationDraft* draft,
-                 std::vector<Compiler::SplitPoints>* split) {
+                 const Subspace& subspace, const std::vector<SetHere>& set_here, NamedSignals* named,
+                 AccelerationDraft* draft, std::vector<Compiler::SplitPoints>* split) {
   KpsaConfig::Data& data = draft->data;
   RangesByPlug ranges;
   for (const TrainedRange& range : subspace.ranges) ranges.emplace(range.plug, &range);
   const std::vector<PlugRef> varying = GuardedPlugs(graph, target, subspace.rig, ranges, set_here, draft);
   std::vector<std::string> unguarded;
   std::vector<PlugRef> plugs = target.outputs();
-  for (const PlugRef& plug : MatricesRead(graph, target, subspace)) plugs.push_back(plug);
+  for (const PlugRef& plug : MatricesRead(subspace, named)) plugs.push_back(plug);
   Request request;
   for (const PlugRef& plug : plugs) request.outputs.push_back({plug, {}});
   request.varying = varying;
@@ -185,9 +196,12 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
     double rest[12];
     bool have_rest = false;
     std::uint64_t patches = 0;
+    std::string name = target.within.Inner(signal.name);  // and of its entries, as EntryName has them
+    const std::size_t length = name.size();
     for (std::size_t e = 0; e < signal.entries(); ++e) {
       TrainedRange range;
-      if (const auto it = ranges.find(target.within.Inner(EntryName(signal, e))); it != ranges.end()) {
+      if (signal.matrix) name.resize(length), name.append("/").append(std::to_string(e));
+      if (const auto it = ranges.find(name); it != ranges.end()) {
         range.lo = it->second->lo, range.hi = it->second->hi, range.ramp = it->second->ramp;
         range.patches = it->second->patches;
         range.rest = it->second->rest, range.reach = it->second->reach;
@@ -214,8 +228,7 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
 // The inputs of signals that are measured, whether guards look at them or not.
 class CueSignals {
  public:
-  CueSignals(const Graph& graph, const AccelerationTarget& target, AccelerationDraft* draft)
-      : graph_(graph), target_(target), draft_(draft) {
+  CueSignals(NamedSignals* named, AccelerationDraft* draft) : named_(named), draft_(draft) {
     for (const bool matrix : {false, true}) {
       std::vector<Signal>& list = ListOf(matrix);
       for (Index i = 0; i < list.size(); ++i) places_.emplace(list[i].name, i);
@@ -225,39 +238,27 @@ class CueSignals {
   // The row of a scalar, which may be an entry of a matrix.
   Result<KpsaConfig::Row> RowOf(const std::string& plug) {
     const SignalEntry split = SplitEntryName(plug);
-    const Result<const Placed*> placed = Find(split.signal);
-    if (!placed.ok()) return placed.status();
-    const bool is_matrix = (*placed)->signal.matrix;
+    const Result<const Signal*> signal = named_->Find(split.signal);
+    if (!signal.ok()) return signal.status();
+    const bool is_matrix = (*signal)->matrix;
     if (is_matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
       return Status::Invalid(
           "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", plug);
     KpsaConfig::Row row;
     row.kind = is_matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
     row.element = static_cast<Index>(split.entry.value_or(0));
-    row.input = (*placed)->input;
+    row.input = Place(**signal);
     return row;
   }
   // The matrix in whose space something is measured.
   Result<Index> JointOf(const std::string& plug) {
-    const Result<const Placed*> placed = Find(plug);
-    if (!placed.ok()) return placed.status();
-    return (*placed)->signal.relative ? (*placed)->input : kNoIndex;
+    const Result<const Signal*> signal = named_->Find(plug);
+    if (!signal.ok()) return signal.status();
+    const Index input = Place(**signal);
+    return (*signal)->relative ? input : kNoIndex;
   }
 
  private:
-  struct Placed {
-    Signal signal;
-    Index input = 0;
-  };
-  // A signal by what the subspace calls it; many cues are entries of the same one.
-  Result<const Placed*> Find(const std::string& name) {
-    const auto known = found_.find(name);
-    if (known != found_.end()) return &known->second;
-    Result<Signal> signal = FindSignal(graph_, name, target_.within);
-    if (!signal.ok()) return signal.status();
-    const Index input = Place(*signal);
-    return &found_.emplace(name, Placed{std::move(*signal), input}).first->second;
-  }
   // A signal that is no input yet becomes one.
   Index Place(const Signal& signal) {
     std::vector<Signal>& list = ListOf(signal.matrix);
@@ -280,15 +281,13 @@ class CueSignals {
     return place->second;
   }
   std::vector<Signal>& ListOf(bool matrix) { return matrix ? draft_->matrices : draft_->scalars; }
-  const Graph& graph_;
-  const AccelerationTarget& target_;
+  NamedSignals* named_;
   AccelerationDraft* draft_;
   std::unordered_map<std::string, Index> places_;  // a signal is in one of both lists
-  std::unordered_map<std::string, Placed> found_;
 };
 
 // Where the rows of the measurement come from.
-Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
+Status AddCues(const AccelerationTarget& target, const Subspace& subspace, NamedSignals* named,
                AccelerationDraft* draft) {
   KpsaConfig::Data* const data = &draft->data;
   struct CueInput {  // points by mesh and stage
@@ -297,7 +296,7 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
     std::vector<Index> points;
   };
   std::vector<CueInput> inputs;
-  CueSignals signals(graph, target, draft);
+  CueSignals signals(named, draft);
   for (const CueDescription& cue : subspace.cues) {
     if (cue.kind != CueDescription::Kind::kPoint) continue;
     const auto& stages = target.meshes[cue.mesh].stages;
@@ -369,19 +368,22 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
 // those whose scale may vary, else the space.
 std::string StretchedName(const Graph& graph, Compiler* compiler, const AccelerationTarget& target) {
   if (target.space.empty()) return "the space";
-  std::string varying;
+  std::string varying = graph.name(target.space[0].node);
   std::vector<NodeId> nodes;
   Request request;
+  bool may_be_now = false;  // others rest
   for (const NodeId node : ParentsFrom(graph, target.space[0].node)) {
     const int scale = graph.def(node).FindAttribute("scale"),
               matrix = graph.def(node).FindAttribute("matrix");
     if (scale < 0 || matrix < 0) continue;
     nodes.push_back(node);
     request.outputs.push_back({{node, matrix, -1, -1}, {}});
+    may_be_now |= graph.IsPosed(node, scale) || !graph.Inputs(node, scale).empty();
     for (const PlugRef& v : target.varying) {
       if (v.node == node && v.attribute == scale) varying = graph.name(node);
     }
   }
+  if (!may_be_now) return varying;
   // As they are now, by a compiler of its own: the other one keeps kernels of the last compilation
   if (const auto plan = Compiler().Compile(graph, request); plan.ok()) {
     Evaluator evaluator(*plan);
@@ -394,7 +396,7 @@ std::string StretchedName(const Graph& graph, Compiler* compiler, const Accelera
       if (frame.stretch > 1e-6 || frame.scale != 1) return graph.name(nodes[i]);
     }
   }
-  return varying.empty() ? graph.name(target.space[0].node) : varying;
+  return varying;
 }
 
 // Where the points of the patches lie, from the points at rest.
@@ -474,8 +476,9 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   std::vector<SetHere> set_here;
   KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, options, &draft, &set_here));
   std::vector<Compiler::SplitPoints> split;
-  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, set_here, &draft, &split));
-  KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
+  NamedSignals named(graph, target.within);
+  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, set_here, &named, &draft, &split));
+  KPSA_RETURN_IF_ERROR(AddCues(target, *subspace, &named, &draft));
   for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
     draft.data.outputs_in_space.push_back(mesh.stages.back().world);
   KPSA_RETURN_IF_ERROR(FindSteps(split, &draft));

@@ -149,7 +149,6 @@ std::vector<SetHere> Different(const Graph& graph, NodeId node, int attribute) {
   const AttributeDef& a = graph.def(node).attributes[static_cast<std::size_t>(attribute)];
   const Values written = graph.WrittenValues(node, attribute), values = graph.Values(node, attribute);
   std::vector<SetHere> different;
-  if (values.data() == written.data()) return different;
   // Nodes may ask whether a structural one is set
   const bool as_often = !a.structural || values.size() == written.size();
   const auto compare = [&](const PlugRef& plug) {
@@ -211,6 +210,7 @@ std::vector<SetHere> TakeSetHere(const Graph& graph, const std::vector<PlugRef>&
       const AttributeDef& a = attributes[i];
       const auto attribute = static_cast<int>(i);
       if (!upstream.Counts(a)) continue;
+      if (graph.Values(node, attribute).data() == graph.WrittenValues(node, attribute).data()) continue;
       std::vector<SetHere> different = Different(graph, node, attribute);
       const bool as_trained = digest_in(trained, name, a.name) == digest_in(*now, name, a.name);
       if (!as_trained) {
