@@ -117,5 +117,59 @@ TEST_F(Untouched, TheBitsAreThoseOfAllPoints) {
   }
 }
 
+int asked_what_it_touches = 0;
+
+// Deformers may look at all of their points for it, so they are asked once for the same points, as long as nothing that
+// they may look at changes; what a compilation has not needed is forgotten.
+TEST(UntouchedAgain, ADeformerIsAskedOnceForTheSamePoints) {
+  NodeRegistry registry;
+  AddToyNodes(registry);
+  registry.add("ask", "Leaves the points as they are, and touches those from the first on.")
+      .structural("first", 0)
+      .points_in("points")
+      .in("by", 0.0)
+      .out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) { CopyPoints(c.points(0), c.out_points(0)); })
+      .bind([](const Binding&) {
+        return Result<BoundKernel>(BoundKernel{std::make_shared<int>(0), 0, 0});
+      })
+      .in_place("points")
+      .touches("points", [](const Structural& structural, const PointSet& points) {
+        ++asked_what_it_touches;
+        return points.Contains(static_cast<Index>(structural.get_int("first")));
+      });
+  TestGraph g(registry);
+  g.add("add", "up");
+  g.add("source", "src");
+  g.add("ask", "d", {{"first", std::int64_t{5}}});
+  g.connect("src.outPoints", "d.points");
+  g.connect("up.out", "d.by");
+  g.vary("up.a");
+  const auto steps_of = [&](Index point) {
+    const Request request{{{g.plug("d.outPoints"), PointSet::Of({point}, 10)}}, g.request.varying};
+    const auto plan = g.compiler.Compile(g.graph, request);
+    return plan.ok() ? (*plan)->steps().size() : 100;
+  };
+  const auto expect = [&](Index point, std::size_t steps, int times, const char* what) {
+    asked_what_it_touches = 0;
+    EXPECT_EQ(steps_of(point), steps) << what;
+    EXPECT_EQ(asked_what_it_touches, times) << what;
+  };
+  expect(3, 0, 1, "first");
+  expect(3, 0, 0, "again");
+  expect(5, 2, 1, "another point");
+  expect(5, 2, 0, "that again");
+  ASSERT_TRUE(g.graph.Set(g.plug("d.first"), Value(std::int64_t{3})).ok());
+  expect(3, 2, 1, "what it looks at has changed");
+  ASSERT_TRUE(g.graph.Set(g.plug("d.first"), Value(std::int64_t{5})).ok());
+  expect(5, 2, 1, "forgotten");
+  const Request request{{{g.plug("d.outPoints"), PointSet::Of({4}, 10)}}, g.request.varying};
+  asked_what_it_touches = 0;
+  ASSERT_TRUE(g.compiler.SurveyOf(g.graph, request, {}).ok());
+  EXPECT_EQ(asked_what_it_touches, 1);
+  expect(4, 0, 0, "a survey asked that");
+  expect(5, 2, 1, "forgotten again");
+}
+
 }  // namespace
 }  // namespace kpsa::engine
