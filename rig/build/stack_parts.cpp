@@ -38,7 +38,9 @@ MadeNode* FindDeformer(const BuildInput& in, const RigString& name, MadeNodes* n
   for (const MadeNode& made : *nodes) {
     if (deforms(made)) names.push_back(made.from->name);
   }
-  in.Fail(name.where, Status::Invalid("unknown deformer \"{}\"{}", name.text, DidYouMean(name.text, names)));
+  Suggestion meant = DidYouMean(name.text, names);
+  meant.otherwise = "; expected a deformer of \"nodes\", or gltf, morph, skin or restSkin";
+  in.Fail(name.where, Status::Invalid("unknown deformer \"{}\"{}", name.text, meant));
   return nullptr;
 }
 

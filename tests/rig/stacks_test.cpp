@@ -135,13 +135,14 @@ TEST_F(RigStacks, ExplainsBadStacks) {
   const std::string text =
       Errors(R"(nodes: {mush: {type: deltaMush}, mush2: {type: deltaMush}, t: {type: transform}}
 deform:
-  - {meshes: [body], stack: [gltf, mosh, t, morph]}
+  - {meshes: [body], stack: [gltf, mosh, t, morph, wobbler]}
   - {meshes: [body, bodi, tip], stack: [gltf]}
 accelerate:
   a: {points: [body@mosh], space: mush, test: {clips: [weve]}}
   b: {points: [bode@skin], train: {samples: 10}}
 )");
   EXPECT_TRUE(Has(text, "t.yaml:5:36: unknown deformer \"mosh\" (did you mean \"mush\"?)")) << text;
+  EXPECT_TRUE(Has(text, "unknown deformer \"wobbler\"; expected a deformer of \"nodes\", or gltf, morph")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:5:42: \"t\" is a transform, no deformer")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:5:45: \"morph\" brings the stage morph of \"body\" a second time")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:6:15: mesh \"body\" has a stack already, at t.yaml:5:15")) << text;
