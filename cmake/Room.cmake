@@ -10,8 +10,8 @@ function(kpsa_room name)
   kpsa_library(${name} SOURCES ${sources} PUBLIC ${room_PUBLIC} PRIVATE ${room_PRIVATE})
 endfunction()
 
-# Rooms that read, write and report more than they compute. Without optimisation they compile in two fifths of the time, which a
-# build that runs the tests once never gains back
+# Rooms that read, write and report more than they compute, or of whose computing the sanitized tests do little. Without optimisation
+# they compile in two fifths of the time, which a build that runs the tests once never gains back
 set(KPSA_READERS files rig gltf scenes kpsa host report view cli)
 # With a little of it in two thirds: these are as fast with that as with all (loading a rig, training), and share a precompiled header
 set(KPSA_TALKERS rig host report view cli promise untouched growth)
