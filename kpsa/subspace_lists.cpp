@@ -1,6 +1,7 @@
 #include "kpsa/subspace_lists.h"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "files/json_depth.h"
 #include "kpsa/name_table.h"
@@ -216,8 +217,8 @@ Status ReadTraining(const SafetensorsFile& file, std::string* training) {
   const Result<std::vector<std::uint8_t>> text = file.Values<std::uint8_t>(kTrainingKey, {kAnyRows});
   if (!text.ok()) return text.status();
   training->assign(text->begin(), text->end());
-  // No further: loading needs nothing of it, and ParseTraining takes what is there
-  const bool is_object = training->starts_with('{') && CheckJsonDepth(*text, kDeepestEntry).ok();
+  const bool is_object = training->starts_with('{') && CheckJsonDepth(*text, kDeepestEntry).ok() &&
+                         nlohmann::json::accept(*training);
   return is_object ? Status() : Status::Invalid("\"{}\" is not a JSON object", kTrainingKey);
 }
 

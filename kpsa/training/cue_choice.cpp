@@ -23,7 +23,7 @@ constexpr double kPointPrice = 12;           // rows: what a point then has to b
 constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
 // Share of the poses beyond the tolerance from which worst points are measured: where no judge says what
 // misses, and where more than kMissed of the judges do
-constexpr double kHopeless = 0.15, kHopelessBefore = 0.01, kMissed = 0.02;
+constexpr double kHopeless = 0.15, kHopelessWhereMissed = 0.01, kMissed = 0.02;
 constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
 constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
@@ -101,7 +101,7 @@ class Chooser {
     }
     const bool early = std::any_of(chosen_.begin(), chosen_.end(),
                                    [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
-    const double hopeless = compares && best_.misses > kMissed ? kHopelessBefore : kHopeless;
+    const double hopeless = compares && best_.misses > kMissed ? kHopelessWhereMissed : kHopeless;
     if (early && !options_.by_rms && AddWorstPoints(hopeless)) better |= compares && KeepIfCheaper();
     return better;
   }

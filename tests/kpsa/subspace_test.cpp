@@ -492,6 +492,8 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_NE(entry("names", 0, std::uint8_t{'x'}).find("the file is damaged"), std::string::npos);
   EXPECT_NE(entry("training", 0, std::uint8_t{'['}).find("\"training\" is not a JSON object"),
             std::string::npos);
+  EXPECT_NE(entry("training", 1, std::uint8_t{'}'}).find("\"training\" is not a JSON object"),
+            std::string::npos);
   EXPECT_NE(entry("signatureNodes", 2, U32{7}).find("has 7 attributes"), std::string::npos);
   EXPECT_NE(entry("signatureNodes", 2, U32{0}).find("belong to no node"), std::string::npos);
   EXPECT_NE(entry("controls", 0, U32{99}).find("name 99 of"), std::string::npos);
