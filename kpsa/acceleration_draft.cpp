@@ -441,13 +441,14 @@ Status FindSteps(const std::vector<Compiler::SplitPoints>& split, AccelerationDr
             "the subspace mends points of {} by a last step that the rig lacks; train it again", output.name);
     }
     if (output.inner == 0) continue;
-    const bool fits = here->points() == output.points;
-    step = fits && !output.stepped.empty() ? MakePartialStep(here, output.stepped) : here;
-    if (!fits || step->inner_points() != output.inner)
+    step = here;
+    if (here->points() == output.points && !output.stepped.empty())
+      step = MakePartialStep(here, output.stepped);
+    if (here->points() != output.points || step == nullptr || step->inner_points() != output.inner)
       return Status::Invalid(
           "the subspace is for {} points before the last step of {}, and the rig has {} there; train it "
           "again",
-          output.inner, output.name, step->inner_points());
+          output.inner, output.name, step == nullptr ? "others" : fmt::format("{}", step->inner_points()));
   }
   return Status();
 }

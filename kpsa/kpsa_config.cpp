@@ -13,7 +13,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   for (const TileMap& tiles : s.tiles) hasher.Add(tiles.digest());
   for (const SubspaceOutput& output : s.outputs) {
     hasher.Add(output.inner);
-    hasher.AddLong(std::span<const Index>(output.stepped));
+    hasher.AddLong(std::span<const Index>(output.stepped.points));
+    hasher.AddLong(std::span<const Index>(output.stepped.starts));
   }
   for (const TileMend& mend : s.mends) {
     hasher.Add(mend.output);
@@ -107,8 +108,10 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
       for (std::size_t m = 0; m < data.subspace->tiles.size(); ++m) {
         const auto tiles = static_cast<Index>(data.subspace->tiles[m].tiles());
         if (tile < tiles)
-          return fmt::format("bent farther than the trained poses (most at {}, points from {} on)",
-                             data.subspace->outputs[m].name, tile * kTilePoints);
+          return fmt::format(
+              "bent farther than the trained poses (most at {}, points from {} on)",
+              data.subspace->outputs[m].name,
+              data.subspace->outputs[m].stepped.PointsOf(tile, data.subspace->outputs[m].points).begin);
         tile -= tiles;
       }
       return "bent farther than the trained poses";

@@ -32,8 +32,9 @@ OutputReconstruction::OutputReconstruction(std::shared_ptr<const Subspace> subsp
   } else {
     if (step != nullptr)
       mends_ = BoundMends(subspace_->mends, tiles(), static_cast<Index>(output_), wanted, *step);
-    if (!all_) points_ = wanted.ToVector(), places_ = wanted.PositionsOf(wanted);
-    direct_ = TilesWith(points_);
+    std::vector<Index> points = all_ ? std::vector<Index>() : wanted.ToVector();
+    for (Index i = 0; i < points.size(); ++i) AddToRuns(points[i], i, &places_);
+    direct_ = TilesWith(points);
   }
   if (!direct() || step_ != nullptr) padded_ = PaddedCount(of.reconstructed());
 }
@@ -45,21 +46,21 @@ void OutputReconstruction::Divide(const SubspaceOutput& output, const PointSet& 
   } else {
     std::vector<Index> of_step;
     for (Index i = 0; i < wanted.size(); ++i) {
-      const auto tile = static_cast<Index>(wanted[i] / kTilePoints);
-      // A tile that ends with the mesh holds inner points, too
-      const bool whole = (std::size_t{tile} + 1) * kTilePoints <= output.points;
-      if (whole && !std::ranges::binary_search(output.stepped, tile)) {
-        points_.push_back(wanted[i]);
-        places_.push_back(i);
-      } else {
+      const auto tile = static_cast<Index>(output.stepped.TileOf(wanted[i]));
+      if (output.HoldsInner(tile)) {
+        AddToRuns(static_cast<Index>(of_step.size()), i, &step_places_);
         of_step.push_back(wanted[i]);
-        step_places_.push_back(i);
+        continue;
       }
+      const Index start = output.stepped.PointsOf(tile, output.points).begin;
+      AddToRuns(static_cast<Index>(tile * kTilePoints) + wanted[i] - start, i, &places_);
+      if (!direct_.empty() && direct_.back() == tile) continue;
+      direct_.push_back(tile);
+      starts_.push_back(start);
     }
-    direct_ = TilesWith(points_);
     if (of_step.empty()) return;
+    if (!direct_.empty()) apart_ = of_step.size();
     step_ = step.Bind(PointSet::Of(std::move(of_step), wanted.total()));
-    if (points_.empty()) step_places_.clear();
   }
   tiles_ = TilesWith(step_->inner());
   if (tiles_.size() == tiles().tiles()) tiles_.clear();
@@ -67,7 +68,7 @@ void OutputReconstruction::Divide(const SubspaceOutput& output, const PointSet& 
 
 std::size_t OutputReconstruction::scratch_floats() const {
   const std::size_t y = PaddedCount(kBlockFrames * subspace_->tile_inputs());
-  const std::size_t step = step_ == nullptr ? 0 : FloatsOf(step_places_.size()) + step_->scratch_floats();
+  const std::size_t step = step_ == nullptr ? 0 : FloatsOf(apart_) + step_->scratch_floats();
   return y + std::max(3 * padded_ + step, mends_.scratch_floats());
 }
 
@@ -93,7 +94,6 @@ void OutputReconstruction::Reconstruct(std::span<const Frame> frames, std::span<
   bool moved = false;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     outs[f] = mesh == nullptr ? frames[f].out : *mesh;
-    if (!some.empty()) outs[f].count = tiles().points();  // of which only those of some tiles are written
     inputs[f] = frames[f].inputs;
     // A step runs in the space: that grows and turns all of it at once
     if (in_space || frames[f].world_from_space == nullptr) continue;
@@ -102,26 +102,27 @@ void OutputReconstruction::Reconstruct(std::span<const Frame> frames, std::span<
   }
   const std::size_t count = frames.size(), r = subspace_->tile_inputs();
   const std::span<const Matrix4> through(spaces, moved ? count : 0);
-  if (inputs[0] != nullptr) return tiles().ReconstructFrom({inputs, count}, {outs, count}, some, through);
-  if (count == 1) return tiles().ReconstructBlock(frames[0].y, {outs, 1}, some, through);
+  const std::span<const Index> places = mesh == nullptr ? std::span(starts_) : std::span<const Index>();
+  if (inputs[0] != nullptr)
+    return tiles().ReconstructFrom({inputs, count}, {outs, count}, some, through, places);
+  if (count == 1) return tiles().ReconstructBlock(frames[0].y, {outs, 1}, some, through, places);
   for (std::size_t f = 0; f < count; ++f)
     std::memcpy(y.data() + f * r, frames[f].y.data(), r * sizeof(float));
-  tiles().ReconstructBlock(y.first(count * r), {outs, count}, some, through);
+  tiles().ReconstructBlock(y.first(count * r), {outs, count}, some, through, places);
 }
 
 void OutputReconstruction::CopyPoints(const Frame& frame, std::span<float> y, PointsView mesh) const {
   Reconstruct({&frame, 1}, direct_, false, &mesh, y);
-  for (std::size_t i = 0; i < points_.size(); ++i) CopyPoint(mesh, points_[i], frame.out, places_[i]);
+  CopyRuns(mesh, places_, frame.out);
 }
 
 void OutputReconstruction::RunStep(const Frame& frame, std::span<float> y, PointsView mesh,
                                    std::span<float> scratch) const {
   Reconstruct({&frame, 1}, tiles_, true, &mesh, y);
-  const std::size_t apart = step_places_.size();
-  const PointsView made = apart == 0 ? frame.out : ViewOf(scratch, apart);
-  step_->Run(mesh, made, scratch.subspan(FloatsOf(apart)));
+  const PointsView made = apart_ == 0 ? frame.out : ViewOf(scratch, apart_);
+  step_->Run(mesh, made, scratch.subspan(FloatsOf(apart_)));
   if (frame.world_from_space != nullptr) TransformPoints(ToFloats(*frame.world_from_space), made);
-  for (std::size_t i = 0; i < apart; ++i) CopyPoint(made, i, frame.out, step_places_[i]);
+  if (apart_ > 0) CopyRuns(made, step_places_, frame.out);
 }
 
 }  // namespace kpsa::engine

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "graph/last_step.h"
+#include "kpsa/scratch_points.h"
 #include "kpsa/subspace.h"
 
 namespace kpsa::engine {
@@ -44,14 +45,16 @@ class OutputReconstruction {
 
   std::shared_ptr<const Subspace> subspace_;
   std::size_t output_;
-  bool all_ = true;            // points are wanted
-  std::vector<Index> points_;  // of these, where not all: those that no step gives, and
-  std::vector<Index> places_;  // where they come out
-  std::vector<Index> direct_;  // the tiles that hold these; none: all, or where there is a step, none
+  bool all_ = true;  // points are wanted
+  std::vector<PointRun>
+      places_;  // of these, where not all, and of tiles without inner points: where they come out
+  std::vector<Index> direct_;  // these tiles; none: all, or where there is a step, none,
+  std::vector<Index> starts_;  // and their first points; none: where they stand
   std::shared_ptr<const LastStep::Bound> step_;
-  std::vector<Index> tiles_;        // that hold what the step reads; none: all
-  std::vector<Index> step_places_;  // where its points come out; none: they are all that comes out
-  std::size_t padded_ = 0;          // floats of a component of all that is reconstructed, for the scratch
+  std::vector<Index> tiles_;           // that hold what the step reads; none: all
+  std::size_t apart_ = 0;              // of its points, where others come out, too, and
+  std::vector<PointRun> step_places_;  // where they do
+  std::size_t padded_ = 0;             // floats of a component of all that is reconstructed, for the scratch
   BoundMends mends_;
 };
 

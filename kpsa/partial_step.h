@@ -1,19 +1,22 @@
-// A last step (graph/last_step.h) of some tiles of a mesh, where only these need one: what is reconstructed of all other
-// points are the points as they come out. Inner point i of a mesh of N points is point i, or of those tiles the step's
-// own inner point i; behind these N stand the other inner points that the step reads for them, ascending.
+// A last step (graph/last_step.h) of some points of a mesh, where only these need one: what is reconstructed of all other
+// points are the points as they come out. Its inner points are, tile after tile, the points of the tile as they come out,
+// or of those points the step's own inner points, and then the other inner points that the step reads about them; what is
+// left of a tile repeats its first point (kpsa/stepped_points.h).
 //
 // Moving and turning works as for the step itself; so does what its errors, threads and allocations are.
 #pragma once
 
 #include "graph/last_step.h"
+#include "kpsa/stepped_points.h"
 
 namespace kpsa::engine {
 
-// The points of some tiles (kTilePoints) of a mesh, ascending as the tiles are. Tiles beyond the mesh have none.
-std::vector<Index> PointsOfTiles(std::span<const Index> tiles, std::size_t points);
+// As many points in each tile as there is room for beside what the step reads about them. points: of the step's mesh,
+// ascending, at least one.
+SteppedPoints LayOut(const LastStep& step, std::vector<Index> points);
 
-// tiles: ascending, at least one, each with points of the step's mesh.
+// stepped: fits the step's mesh. Null where what the step reads has no room there.
 std::shared_ptr<const LastStep> MakePartialStep(std::shared_ptr<const LastStep> step,
-                                                std::span<const Index> tiles);
+                                                const SteppedPoints& stepped);
 
 }  // namespace kpsa::engine

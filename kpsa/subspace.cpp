@@ -55,6 +55,14 @@ Status CheckPatches(const CalibrationPair& pair) {
 
 }  // namespace
 
+bool SubspaceOutput::HoldsInner(std::size_t tile) const {
+  if (inner == 0 || stepped.empty()) return inner > 0;
+  const SteppedPoints::Range of = stepped.PointsOf(tile, points);
+  if (of.end - of.begin < std::min(kTilePoints, inner - tile * kTilePoints)) return true;
+  const auto found = std::ranges::lower_bound(stepped.points, of.begin);
+  return found != stepped.points.end() && *found < of.end;
+}
+
 std::string CueName(const Subspace& subspace, const CueDescription& cue) {
   if (cue.kind == CueDescription::Kind::kScalar) return cue.plug;
   if (cue.kind == CueDescription::Kind::kProduct) {
@@ -155,14 +163,15 @@ Status ValidateSubspace(const Subspace& s) {
                              s.outputs[i].name, s.outputs[i].points, s.outputs[i].inner, s.components,
                              s.patches.tiles);
     }
-    const std::vector<Index>& stepped = s.outputs[i].stepped;
-    if (!stepped.empty() && (s.outputs[i].inner == 0 ||
-                             std::ranges::adjacent_find(stepped, std::greater_equal()) != stepped.end() ||
-                             stepped.back() >= (s.outputs[i].points + kTilePoints - 1) / kTilePoints)) {
+    const SteppedPoints& stepped = s.outputs[i].stepped;
+    const std::size_t tiles = (s.outputs[i].inner + kTilePoints - 1) / kTilePoints;
+    if (!stepped.empty() && (s.outputs[i].inner == 0 || !stepped.Fit(s.outputs[i].points) ||
+                             (!stepped.starts.empty() && stepped.starts.size() != tiles))) {
       return Status::Invalid(
-          "output \"{}\": the tiles that a last step is of should count up and be below {}, and there should "
-          "be inner points",
-          s.outputs[i].name, (s.outputs[i].points + kTilePoints - 1) / kTilePoints);
+          "output \"{}\": the points that a last step is of should count up and be below {}, tiles begin at "
+          "multiples of "
+          "{} and have no more than {} points, and there should be inner points",
+          s.outputs[i].name, s.outputs[i].points, SteppedPoints::kStartsAt, kTilePoints);
     }
     if (s.tiles[i].points() != s.outputs[i].reconstructed() || s.tiles[i].inputs() != s.tile_inputs() ||
         s.tiles[i].data().components != s.components) {

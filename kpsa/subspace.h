@@ -20,6 +20,7 @@
 #include "kpsa/patches.h"
 #include "kpsa/signature.h"
 #include "kpsa/soft_cache.h"
+#include "kpsa/stepped_points.h"
 #include "kpsa/tile_mends.h"
 #include "kpsa/tiles.h"
 
@@ -30,9 +31,9 @@ namespace kpsa::engine {
 // of activity, 15 where patches miss by themselves in blends only. 3: without products of latents, world matrices as
 // cues, and doubts; 4: without products as cues; 5: without patches; 6: without guards of patches; 7: without calibration
 // poses near clips; 8: cues, ranges and the trained rig are JSON, and not tensors; 9: without inner points
-inline constexpr int kSubspaceVersion = 15, kBlendsVersion = 15, kActivityVersion = 14, kHeldVersion = 13,
-                     kPartialVersion = 12, kMendsVersion = 11, kInnerVersion = 10, kListsVersion = 9,
-                     kOldestVersion = 3;
+inline constexpr int kSubspaceVersion = 16, kSteppedPointsVersion = 16, kBlendsVersion = 15,
+                     kActivityVersion = 14, kHeldVersion = 13, kPartialVersion = 12, kMendsVersion = 11,
+                     kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
@@ -85,10 +86,11 @@ struct SubspaceOutput {
   // What is reconstructed instead of them: the inner points of the last step (graph/last_step.h) of the node that they
   // come from, which then runs; 0: the points themselves.
   std::size_t inner = 0;
-  // Where only some tiles go through the step, and the others are points as they come out: which, ascending
-  // (kpsa/partial_step.h); empty: all.
-  std::vector<Index> stepped = {};
+  // Where only some points go through the step, and the others are reconstructed as they come out (kpsa/partial_step.h);
+  // empty: all do.
+  SteppedPoints stepped = {};
   std::size_t reconstructed() const { return inner > 0 ? inner : points; }
+  bool HoldsInner(std::size_t tile) const;  // a point of the tile is an inner one
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };
 

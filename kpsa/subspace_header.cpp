@@ -67,7 +67,7 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
 }
 
 constexpr char kInner[] = "inner";           // points of an output; missing: none
-constexpr char kStepped[] = "stepped";       // tiles that they are of; missing: all
+constexpr char kStepped[] = "stepped";       // tiles that they are of; missing: all, or tensors say
 constexpr char kInBlends[] = "in blends";    // patchMisses
 constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
 
@@ -96,12 +96,18 @@ Status ReadFrame(const Json& frame, Subspace* s) {
 }
 
 Status ReadStepped(const Json& tiles, SubspaceOutput* output) {
+  const std::size_t count = (output->points + kTilePoints - 1) / kTilePoints;
   bool known = tiles.is_array() && !tiles.empty();
+  std::vector<Index> stepped;
   for (std::size_t i = 0; known && i < tiles.size(); ++i) {
-    known = tiles[i].is_number_unsigned() && tiles[i].get<std::uint64_t>() < kMaxPoints;
-    if (known) output->stepped.push_back(static_cast<Index>(tiles[i].get<std::uint64_t>()));
+    known = tiles[i].is_number_unsigned() && tiles[i].get<std::uint64_t>() < count &&
+            (i == 0 || tiles[i].get<std::uint64_t>() > stepped.back());
+    if (known) stepped.push_back(static_cast<Index>(tiles[i].get<std::uint64_t>()));
   }
-  if (!known) return Status::Invalid("an output: \"{}\" should be numbers of tiles", kStepped);
+  if (!known)
+    return Status::Invalid("an output: \"{}\" should be numbers of tiles that count up, below {}", kStepped,
+                           count);
+  output->stepped.points = PointsOfTiles(stepped, output->points);
   return {};
 }
 
@@ -169,18 +175,20 @@ Status ReadJsonLists(const SafetensorsFile& file, Status* status, Subspace* s) {
 
 // The oldest that says all of it.
 int VersionOf(const Subspace& s) {
-  const bool partial =
-      std::ranges::any_of(s.outputs, [](const SubspaceOutput& output) { return !output.stepped.empty(); });
+  const auto of_some = [](const SubspaceOutput& output) { return !output.stepped.empty(); };
+  const auto of_points = [](const SubspaceOutput& output) { return !output.stepped.starts.empty(); };
+  const bool partial = std::ranges::any_of(s.outputs, of_some);
   const bool held = std::ranges::any_of(s.calibration, [](const CalibrationPair& pair) {
     return pair.kind == static_cast<int>(PoseKind::kHeld);
   });
-  return s.patches.blends_only             ? kBlendsVersion
-         : std::isfinite(s.activity_limit) ? kActivityVersion
-         : held                            ? kHeldVersion
-         : partial                         ? kPartialVersion
-         : !s.mends.empty()                ? kMendsVersion
-         : s.of_inner()                    ? kInnerVersion
-                                           : kListsVersion;
+  return std::ranges::any_of(s.outputs, of_points) ? kSteppedPointsVersion
+         : s.patches.blends_only                   ? kBlendsVersion
+         : std::isfinite(s.activity_limit)         ? kActivityVersion
+         : held                                    ? kHeldVersion
+         : partial                                 ? kPartialVersion
+         : !s.mends.empty()                        ? kMendsVersion
+         : s.of_inner()                            ? kInnerVersion
+                                                   : kListsVersion;
 }
 
 }  // namespace
@@ -190,7 +198,8 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
   for (const SubspaceOutput& output : s.outputs) {
     outputs.push_back({{"name", output.name}, {"points", output.points}, {"stage", output.stage}});
     if (output.inner > 0) outputs.back()[kInner] = output.inner;
-    if (!output.stepped.empty()) outputs.back()[kStepped] = output.stepped;
+    if (!output.stepped.empty() && output.stepped.starts.empty())
+      outputs.back()[kStepped] = WholeTiles(output.stepped.points, output.points);
   }
   Json frame = {{"extent", s.extent}, {"scales", s.space_scales}, {"carried", s.carried}};
   for (int r = 0; r < 3; ++r) {

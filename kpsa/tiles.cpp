@@ -449,7 +449,8 @@ Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs,
 }
 
 void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
-                               std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
+                               std::span<const Index> tiles, std::span<const Matrix4> spaces,
+                               std::span<const Index> places) const {
   KPSA_CHECK_LE(outs.size() * data_.inputs, y.size());
   Run(
       [&](std::span<const std::size_t> some, std::size_t frame, InputSpace* space, const float** t) {
@@ -461,11 +462,12 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
         ComputeTileInputs({terms, some.size()}, y.data() + frame * data_.inputs);
       },
       [&](std::size_t frame, float* entries) { JointMatricesOf(y.data() + frame * data_.inputs, entries); },
-      outs, tiles, spaces);
+      outs, tiles, spaces, places);
 }
 
 void TileMap::ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
-                              std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
+                              std::span<const Index> tiles, std::span<const Matrix4> spaces,
+                              std::span<const Index> places) const {
   KPSA_CHECK_EQ(inputs.size(), outs.size());
   Run(
       [&](std::span<const std::size_t> some, std::size_t frame, InputSpace*, const float** t) {
@@ -474,14 +476,16 @@ void TileMap::ReconstructFrom(std::span<const float* const> inputs, std::span<co
       [&](std::size_t frame, float* entries) {
         std::copy_n(inputs[frame] + data_.scale.size(), data_.joint_rows.size(), entries);
       },
-      outs, tiles, spaces);
+      outs, tiles, spaces, places);
 }
 
 template <typename InputsOf, typename JointsOf>
 void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
-                  std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
+                  std::span<const Index> tiles, std::span<const Matrix4> spaces,
+                  std::span<const Index> places) const {
   if (outs.empty()) return;
-  for (const PointsView& out : outs) KPSA_CHECK_EQ(out.count, data_.points);
+  KPSA_CHECK(places.empty() || places.size() == tiles.size());
+  for (const PointsView& out : outs) KPSA_CHECK(!places.empty() || out.count == data_.points);
   KPSA_CHECK(spaces.empty() || (spaces.size() == outs.size() && data_.components == 3));
   for (std::size_t i = 0; i < tiles.size(); ++i)
     KPSA_CHECK(tiles[i] < this->tiles() && (i == 0 || tiles[i - 1] < tiles[i]));
@@ -527,7 +531,7 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
         }
       }
       for (std::size_t i = 0; i < ahead; ++i) {
-        const std::size_t tile = some[i], begin = tile * kTilePoints;
+        const std::size_t tile = some[i], begin = places.empty() ? tile * kTilePoints : places[next + i];
         tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile),
                     Groups(data_.ranks[tile], data_.wide[tile]),
                     data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows, begin, frames[i],

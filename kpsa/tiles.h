@@ -127,9 +127,11 @@ class TileMap {
   // the cache.
   void Reconstruct(std::span<const float> y, PointsView out, const Matrix4* space = nullptr) const;
   // Frames: y [frames x r] row-major, one output each, and one space each or none. Only the tiles listed
-  // (ascending, none twice; other points are not touched); empty: all.
+  // (ascending, none twice; other points are not touched); empty: all. places: where the points of each of these go,
+  // multiples of 16; empty: where they stand.
   void ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
-                        std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
+                        std::span<const Index> tiles, std::span<const Matrix4> spaces = {},
+                        std::span<const Index> places = {}) const;
   // What U of every tile is multiplied by [input_size()], so that what the doubt needs is computed once; and
   // the largest doubt, for y that are finite: 0 and no tile without products.
   std::size_t input_size() const { return data_.scale.size() + (data_.joint_rows.size() + 15) / 16 * 16; }
@@ -137,7 +139,8 @@ class TileMap {
   Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs, std::span<float> doubts = {}) const;
   // ReconstructBlock from these; as many of them as frames. The same bits.
   void ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
-                       std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
+                       std::span<const Index> tiles, std::span<const Matrix4> spaces = {},
+                       std::span<const Index> places = {}) const;
 
  private:
   struct Place {  // of a tile in the arrays of products
@@ -152,7 +155,8 @@ class TileMap {
   // a few tiles are, perhaps in `space`. joints_of(frame, entries): as JointMatricesOf.
   template <typename InputsOf, typename JointsOf>
   void Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
-           std::span<const Index> tiles, std::span<const Matrix4> spaces) const;
+           std::span<const Index> tiles, std::span<const Matrix4> spaces,
+           std::span<const Index> places) const;
 
   TileData data_;
   std::optional<Digest> known_digest_;

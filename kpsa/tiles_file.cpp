@@ -11,6 +11,11 @@ void AddTiles(const Subspace& s, SafetensorsWriter* writer) {
   for (std::size_t i = 0; i < s.tiles.size(); ++i) {
     const TileData& data = s.tiles[i].data();
     const std::string prefix = fmt::format("tiles.{}.", i);
+    const SubspaceOutput& output = s.outputs[i];
+    if (!output.stepped.starts.empty()) {  // else the header says which tiles
+      Add<std::uint32_t>(writer, prefix + "stepped", output.stepped.points);
+      Add<std::uint32_t>(writer, prefix + "starts", output.stepped.starts);
+    }
     Add<std::uint32_t>(writer, prefix + "ranks", data.ranks);
     Add<std::uint32_t>(writer, prefix + "wide", data.wide);
     Add<std::uint8_t>(writer, prefix + "direct", data.direct);
@@ -46,6 +51,11 @@ Status ReadTiles(const SafetensorsFile& file, const std::string& file_digest, Su
   };
   for (std::size_t i = 0; i < s->outputs.size(); ++i) {
     const std::string prefix = fmt::format("tiles.{}.", i);
+    if (file.tensors().contains(prefix + "stepped")) {
+      SteppedPoints& stepped = s->outputs[i].stepped;
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "stepped", {kAny}), &stepped.points));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "starts", {kAny}), &stepped.starts));
+    }
     TileData data;
     data.points = s->outputs[i].reconstructed();
     data.components = s->components;

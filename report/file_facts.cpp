@@ -210,11 +210,11 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                  {"training", TrainingText(*subspace)}};
   if (subspace->of_inner()) {
     std::size_t stepped = 0;
-    for (const SubspaceOutput& output : subspace->outputs) stepped += output.stepped.size();
+    for (const SubspaceOutput& output : subspace->outputs) stepped += output.stepped.points.size();
     facts.facts.emplace_back(
         "reconstructs", stepped == 0
                             ? std::string("points before the last step")
-                            : fmt::format("points, and of {} tiles those before the last step", stepped));
+                            : fmt::format("points, and {} of them before the last step", stepped));
   }
   if (std::isfinite(subspace->activity_limit))
     facts.facts.emplace_back("most at once", fmt::format("{:.3g}, of squared shares of what signals reached",

@@ -87,15 +87,16 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
   return trained;
 }
 
-// Tiles of all meshes, by mesh.
-std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<const std::size_t> tiles) {
+// Points of the tiles of all meshes, by mesh: point k of tile t is kTilePoints t + k.
+std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<const std::size_t> points) {
   std::vector<std::vector<Index>> of_meshes;
   std::size_t first = 0;
   for (std::size_t m = 0; m < setup.totals.size(); ++m) {
-    const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
+    const std::size_t count =
+        (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints * kTilePoints;
     std::vector<Index>& own = of_meshes.emplace_back();
-    for (const std::size_t tile : tiles) {
-      if (tile >= first && tile < first + count) own.push_back(static_cast<Index>(tile - first));
+    for (const std::size_t point : points) {
+      if (point >= first && point < first + count) own.push_back(static_cast<Index>(point - first));
     }
     first += count;
   }

@@ -24,12 +24,12 @@ struct Trained {
   bool ended = false;                        // as Ends allows: there is no subspace
   std::vector<std::size_t> untold = {};      // of these, that it gets wrong unnoticed (UntoldControls)
   std::vector<std::size_t> held = {};        // controls that no clip moves (HeldControls)
-  // With the tiles, by mesh, that are to blame: a last step should be of them alone. Empty: with its cues.
+  // With the points, by mesh, that are to blame: a last step should be of them alone. Empty: with its cues.
   std::vector<std::vector<Index>> poor = {};
 };
 
 // Where a training may end without a subspace: with its cues, where these are points that come out, a frame is expected
-// to cost more than `enough`, and no cues of tiles serve; or with tiles of meshes with steps, which are to blame for that.
+// to cost more than `enough`, and no cues of tiles serve; or with points of meshes with steps, which are to blame for that.
 struct Ends {
   double enough = std::numeric_limits<double>::infinity();
   const std::vector<Compiler::SplitPoints>* steps = nullptr;  // by mesh

@@ -75,6 +75,10 @@ PoseJudge::PoseJudge(const TrainingRig& rig, const Subspace& subspace, const Pos
     steps_.push_back(subspace.outputs[m].inner == 0
                          ? nullptr
                          : rig.step(m)->Bind(PointSet::All(static_cast<Index>(subspace.outputs[m].points))));
+  for (const SubspaceOutput& output : subspace.outputs) {
+    std::vector<Index>& tile_of = tile_of_point_.emplace_back();
+    for (Index i = 0; i < output.points; ++i) tile_of.push_back(static_cast<Index>(output.stepped.TileOf(i)));
+  }
 }
 
 std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
@@ -128,6 +132,7 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
           exact = recorded[step].Of(of_output);
           p = made[step++].Of(p);
         }
+        const std::vector<Index>& tile_of = tile_of_point_[m];
         for (std::size_t i = 0; i < p.count; ++i) {
           const Double3 at = steps_[m] != nullptr
                                  ? Double3{exact.x[i], exact.y[i], exact.z[i]}
@@ -136,7 +141,7 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
           const double squared = Dot(d, d);
           output_sum += squared;
           errors[t].largest = std::max(errors[t].largest, squared);
-          of_tile[i / kTilePoints] = std::max(of_tile[i / kTilePoints], static_cast<float>(squared));
+          of_tile[tile_of[i]] = std::max(of_tile[tile_of[i]], static_cast<float>(squared));
         }
         of_tile += subspace_.tiles[m].tiles();
         errors[t].sum += output_sum;

@@ -41,6 +41,7 @@ class PoseJudge {
   const CueSet& cues_;
   const bool of_tiles_;
   std::vector<std::shared_ptr<const LastStep::Bound>> steps_;  // by output; null: none
+  std::vector<std::vector<Index>> tile_of_point_;              // by output
   double sum_ = 0, max_ = 0;
   std::size_t poses_ = 0;
 };

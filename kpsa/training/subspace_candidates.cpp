@@ -182,7 +182,9 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   std::size_t best = first + priced.best;
   fine = priced.fine;
   if (!steps.ns.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
-    poor = PoorTiles(TileErrors(poses->poses, tiles, fits_), setup->options.tolerance, steps);
+    PointsBeyond beyond;
+    TileErrors(poses->poses, tiles, fits_, &beyond);
+    poor = PoorPoints(beyond, steps);
     if (!poor.empty()) return false;
   }
   // As chosen, without products of tiles: others with these would hardly do better, and take their time

@@ -58,7 +58,7 @@ struct SubspaceCandidates {
   // What comes out of a last step is dear to measure: cues of tiles are tried, and where these do not serve, nothing is
   // made of it
   bool dear = false;
-  TileSteps steps = {};                // that some tiles may go through, in another training
+  TileSteps steps = {};                // that some points may go through, in another training
   std::vector<std::size_t> poor = {};  // they alone are to blame that cues of tiles are not promising
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried
@@ -85,7 +85,7 @@ struct SubspaceCandidates {
 
   bool IsWorthTrying(const FrameCost& of) const;
   double alike() const;         // at how much more cues of tiles are taken
-  bool by_tiles_alone() const;  // the rig has some tiles before a last step
+  bool by_tiles_alone() const;  // the rig has some points before a last step
   // Nobody knows what all points would measure.
   bool knows_tiles_only() const { return by_tiles_alone() || began_with_tiles_; }
   // The largest step, and one that can be done without.

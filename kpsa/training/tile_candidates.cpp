@@ -98,12 +98,15 @@ std::vector<std::vector<NearPoint>> ByMesh(const TrainingRig& rig, const TileCan
   return result;
 }
 
-void AddPoints(const std::vector<NearPoint>& points, std::span<const Double3> positions, Index first,
-               Index count, TileCandidates* tile) {
+// rows: whose point each row of the tile is.
+void AddPoints(const std::vector<NearPoint>& points, std::span<const Double3> positions,
+               std::vector<Index> rows, std::size_t most_own, TileCandidates* tile) {
+  const std::size_t count = rows.size();
+  std::ranges::sort(rows);
   std::vector<const NearPoint*> own, other;
   for (const NearPoint& point : points)
-    (point.point >= first && point.point < first + count ? own : other).push_back(&point);
-  for (const Index i : EvenSpread(own.size(), std::min(own.size(), kOwnPoints)))
+    (std::ranges::binary_search(rows, point.point) ? own : other).push_back(&point);
+  for (const Index i : EvenSpread(own.size(), std::min(own.size(), most_own)))
     tile->points.push_back(own[i]->cue);
   tile->own_points = tile->points.size();
   std::vector<std::pair<double, const NearPoint*>> distances;
@@ -145,7 +148,12 @@ Result<std::vector<TileCandidates>> FindTileCandidates(const TrainingRig& rig, C
       for (const Index signal : (*movers)[tiles.size() - 1]) {
         tile.joints.push_back(first_entry[signal]);
       }
-      AddPoints(points[m], options.positions.subspan(mesh_begin + first, count), first, count, &tile);
+      std::vector<Index> of_rows(count);
+      std::iota(of_rows.begin(), of_rows.end(), first);
+      const LastStep* const step = rig.step(m);
+      for (Index& row : of_rows) row = step == nullptr ? row : step->PointOf(row);
+      AddPoints(points[m], options.positions.subspan(mesh_begin + first, count), std::move(of_rows),
+                rig.stepped.empty() ? kOwnPoints : kTilePoints, &tile);
     }
     mesh_begin += rows;
   }

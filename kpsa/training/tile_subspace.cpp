@@ -17,6 +17,7 @@
 namespace kpsa::engine {
 namespace {
 
+constexpr double kPoor = 0.4;
 constexpr double kBeforeStep = 0.4;     // of the budgets of a tile that gives what a last step reads
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
@@ -25,12 +26,6 @@ constexpr double kMostBeyondHalf = 0.25;
 // One of about so many tiles may be poor, where the others leave so much less: what it misses is priced
 constexpr std::size_t kMayBePoor = 16;
 constexpr double kOfOthers = 0.5;
-// Of what steps may cost, where some tiles stand for all: among the others are more that need one
-constexpr double kOfMost = 0.7;
-// Of the tiles: so few may be to blame that the others are not worth their time. With more, other ways cost about as
-// much
-constexpr double kMostPoor = 1.0 / 3;
-
 // All tiles, in the order of how many poses they leave farther off.
 std::vector<std::size_t> WorstFirst(const Eigen::MatrixXf& errors, double tolerance) {
   std::vector<std::size_t> order(static_cast<std::size_t>(errors.cols()));
@@ -153,9 +148,10 @@ void FinishTiles(TileSubspace* made) {
   s.soft_cache.offsets = made->cues.offsets;
 }
 
-Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
-                           std::span<const TileModel> fits) {
+Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, std::span<const TileModel> fits,
+                           PointsBeyond* beyond) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
+  if (beyond != nullptr) *beyond = PointsBeyond(poses.poses(), choice.candidates.size());
   Eigen::MatrixXf errors(count, static_cast<Eigen::Index>(choice.candidates.size()));
   ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
@@ -166,7 +162,9 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
       const Eigen::MatrixXd measured = choice.measured(fitted.columns, Eigen::all),
                             told =
                                 MultiplyFloats(GemmOperand::Dense(fitted.gain), GemmOperand::Dense(measured));
-      errors.col(static_cast<Eigen::Index>(t)) = LargestErrors(fitted.target - told).cast<float>();
+      const Eigen::MatrixXd off = PointErrors(fitted.target - told);
+      errors.col(static_cast<Eigen::Index>(t)) = off.colwise().maxCoeff().cast<float>();
+      if (beyond != nullptr) beyond->Set(t, off, kPoor * choice.options.tolerance);
     }
   });
   return errors;
@@ -191,39 +189,6 @@ double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size
          static_cast<double>(std::max<Eigen::Index>(errors.rows(), 1));
 }
 
-std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most) {
-  std::vector<std::size_t> order = WorstFirst(errors, tolerance);
-  // Fewer of the worst leave more
-  std::size_t lo = 0, hi = order.size();
-  while (lo < hi) {
-    const std::size_t middle = (lo + hi) / 2;
-    if (ShareBeyond(errors, tolerance, std::span(order).first(middle)) <= most) {
-      hi = middle;
-    } else {
-      lo = middle + 1;
-    }
-  }
-  order.resize(lo);
-  std::ranges::sort(order);
-  return order;
-}
-
-std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance, const TileSteps& steps,
-                                   std::size_t every) {
-  if (steps.ns.empty()) return {};
-  std::vector<std::size_t> worst = WorstTiles(errors, tolerance / 2, kFewBeyond);
-  bool all_step = true;
-  double ns = 0;
-  for (const std::size_t t : worst) {
-    all_step = all_step && steps.ns[t * every] > 0;
-    ns += steps.ns[t * every] * static_cast<double>(every);
-  }
-  if (static_cast<double>(worst.size()) > kMostPoor * static_cast<double>(errors.cols()) || !all_step ||
-      ns > (every > 1 ? kOfMost : 1) * steps.most)
-    worst.clear();
-  return worst;
-}
-
 PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                     const std::vector<TileCandidates>& candidates,
                                     const TileCueOptions& options, const TilePromise& promise,
@@ -240,7 +205,8 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
     if (trial->errors.size() == 0) {
       std::vector<TileCandidates> some;
       for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
-      trial->errors = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
+      trial->errors =
+          TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options), {}, &trial->beyond);
     }
     const Eigen::MatrixXf& errors = trial->errors;
     promising = keeps(errors) && ExpectedBeyond(errors, half, kTrialTiles) <= kMostBeyondHalf;
@@ -250,23 +216,21 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
       promising = keeps(errors, worst) &&
                   ExpectedBeyond(errors, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
     }
-    if (!promising && PoorTiles(errors, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
+    if (!promising && PoorPoints(trial->beyond, promise.steps, kTrialTiles).empty()) return {};
   }
   if (!trial->chosen) *choice = ChooseTiles(mean, poses, candidates, options);
   trial->chosen = true;
   if (promising) return {true, {}};
-  const Eigen::MatrixXf errors = TileErrors(poses, *choice);
+  PointsBeyond beyond;
+  const Eigen::MatrixXf errors = TileErrors(poses, *choice, {}, &beyond);
   if (!many && keeps(errors)) return {true, {}};
-  PromisingTiles found{false, PoorTiles(errors, options.tolerance, promise.steps)};
+  PromisingTiles found{false, PoorPoints(beyond, promise.steps)};
   found.promising = !many && !promise.strict && found.poor.empty();
   return found;
 }
 
 double BudgetOfTile(const SubspaceOutput& output, std::size_t tile) {
-  if (output.inner == 0) return 1;
-  const bool stepped = output.stepped.empty() || (tile + 1) * kTilePoints > output.points ||
-                       std::ranges::binary_search(output.stepped, static_cast<Index>(tile));
-  return stepped ? kBeforeStep : 1;
+  return output.HoldsInner(tile) ? kBeforeStep : 1;
 }
 
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,

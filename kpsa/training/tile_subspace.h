@@ -2,10 +2,10 @@
 // alone. Internal to training.
 #pragma once
 
-#include <limits>
 #include <optional>
 
 #include "kpsa/subspace.h"
+#include "kpsa/training/poor_points.h"
 #include "kpsa/training/tile_builder.h"
 #include "kpsa/training/tile_cues.h"
 
@@ -29,15 +29,6 @@ struct TileChoice {
 TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
 
-// Of the poses: so few of them hardly matter.
-inline constexpr double kFewBeyond = 0.005;
-
-// The last steps that tiles may go through instead.
-struct TileSteps {
-  std::vector<double> ns = {};  // by tile, what its step costs; 0: it has none; empty: none has
-  double most = std::numeric_limits<double>::infinity();  // that all of them may cost
-};
-
 // When tiles are worth their time: at most that share of the poses would be farther off than half the tolerance, or that
 // of them than (nearly) all of it.
 struct TilePromise {
@@ -47,12 +38,13 @@ struct TilePromise {
 };
 struct PromisingTiles {
   bool promising = false;
-  // Where they are not: the tiles that are to blame (PoorTiles)
+  // Where they are not: the points that are to blame (PoorPoints)
   std::vector<std::size_t> poor = {};
 };
 // What an earlier question found, of the same poses, candidates and options: errors of some tiles, and the choice.
 struct TriedTiles {
   Eigen::MatrixXf errors;
+  PointsBeyond beyond;
   bool chosen = false;
 };
 // The same where an eighth of many tiles says that the others are worth their time. choice: unchanged where trial has it;
@@ -61,12 +53,6 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
                                     const std::vector<TileCandidates>& candidates,
                                     const TileCueOptions& options, const TilePromise& promise,
                                     TriedTiles* trial, TileChoice* choice);
-
-// The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few,
-// one of them has no step, or their steps cost too much. Of the tiles of `steps`, errors has one of `every`; then they may
-// cost less, since among the others there are more.
-std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance, const TileSteps& steps,
-                                   std::size_t every = 1);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.
@@ -79,16 +65,14 @@ TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size
 void FinishTiles(TileSubspace* made);
 
 // How far off a point of each tile of the choice would be in each of the same poses, were they stored exactly.
-// [poses x tiles]; fits: as MakeTileSubspace has them, or empty.
+// [poses x tiles]; fits: as MakeTileSubspace has them, or empty. beyond: which points are beyond half the tolerance.
 Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
-                           std::span<const TileModel> fits = {});
+                           std::span<const TileModel> fits = {}, PointsBeyond* beyond = nullptr);
 // Share of the poses in which a tile is farther off, but some of them.
 double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but = {});
 // The same of `every` times as many tiles, as far as each is beyond in poses of its own.
 double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every,
                       std::span<const std::size_t> but = {});
-// The fewest tiles, the worst first, but for which that is at most `most`; ascending.
-std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most);
 
 // How much of the budgets tile `tile` of an output has (TileModel::of_budget): less where it gives what a last step reads,
 // since the frames that the step turns details with are of differences of neighbours.

@@ -22,7 +22,7 @@ constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
 constexpr double kDearFollowing = 0.5, kCheaperAtRest = 0.75;
 constexpr const char* kNotLeft = "no second training that leaves controls at rest which this one gets wrong";
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
-// Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
+// Of many points: all are trained at once, with a step of some points, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
 constexpr std::size_t kMostStepped = 2;
 constexpr double kWorthStepping = 0.5;
@@ -55,17 +55,31 @@ Result<std::optional<TrainingRig>> SplitRig(const TrainingRig& rig, const std::v
   return std::optional(std::move(with));
 }
 
-// The same, but steps are of these tiles alone, by mesh.
-TrainingRig OfTiles(TrainingRig split, std::vector<std::vector<Index>> tiles) {
-  for (std::size_t m = 0; m < split.split.size() && m < tiles.size(); ++m) {
-    Compiler::SplitPoints& of = split.split[m];
-    if (tiles[m].empty()) of = {};
-    if (of.step == nullptr) tiles[m].clear();
-    if (of.step != nullptr) of.step = MakePartialStep(of.step, tiles[m]);
+// The same, but steps are of these points alone, by mesh; nothing where there are none, or they do not fit.
+std::optional<TrainingRig> OfPoints(TrainingRig split, std::vector<SteppedPoints> points) {
+  bool any = false;
+  points.resize(split.split.size());
+  for (std::size_t m = 0; m < points.size(); ++m) {
+    std::shared_ptr<const LastStep>& step = split.split[m].step;
+    if (points[m].empty()) {
+      split.split[m] = {};
+      continue;
+    }
+    if (step == nullptr || !points[m].Fit(step->points())) return std::nullopt;
+    step = MakePartialStep(step, points[m]);
+    if (step == nullptr) return std::nullopt;
+    any = true;
   }
-  tiles.resize(split.split.size());
-  split.stepped = std::move(tiles);
-  return split;
+  split.stepped = std::move(points);
+  return any ? std::optional(std::move(split)) : std::nullopt;
+}
+
+std::optional<TrainingRig> OfPoints(const TrainingRig& split, const std::vector<std::vector<Index>>& points) {
+  std::vector<SteppedPoints> stepped(points.size());
+  for (std::size_t m = 0; m < points.size(); ++m) {
+    if (!points[m].empty() && split.step(m) != nullptr) stepped[m] = LayOut(*split.step(m), points[m]);
+  }
+  return OfPoints(split, std::move(stepped));
 }
 
 // What was tried is told apart from that of another training; also where there was no choice.
@@ -93,31 +107,22 @@ Result<std::optional<TrainingRig>> RigOfSome(const TrainingRig& rig, const Train
   return SomePointsOf(rig, options.many_points, options.some_points);
 }
 
-// Whether there are tiles, all of them of meshes with steps.
-bool HasTiles(const TrainingRig& split, const std::vector<std::vector<Index>>& tiles) {
-  bool any = false;
-  for (std::size_t m = 0; m < tiles.size(); ++m) {
-    if (tiles[m].empty()) continue;
-    const LastStep* const step = m < split.split.size() ? split.step(m) : nullptr;
-    if (step == nullptr || PointsOfTiles({&tiles[m].back(), 1}, step->points()).empty()) return false;
-    any = true;
-  }
-  return any;
-}
-
 std::size_t PointsOf(const TrainingRig& some) {
   std::size_t points = 0;
   for (const std::vector<Index>& of_mesh : some.some) points += of_mesh.size();
   return points;
 }
-// Tiles of all points that tiles of some of them cover.
-std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>& tiles,
-                                           const TrainingRig& some) {
-  std::vector<std::vector<Index>> all(tiles.size());
-  for (std::size_t m = 0; m < tiles.size(); ++m) {
-    const Index end = some.some[m].empty() ? 0 : some.some[m].back() / kTilePoints + 1;
-    for (const Index tile : tiles[m]) {
-      for (Index t = tile * some.every; t < std::min(end, (tile + 1) * some.every); ++t) all[m].push_back(t);
+// All points of the tiles that these points lie in, which are of some of many: what lies between is not known.
+std::vector<std::vector<Index>> AllAbout(const std::vector<std::vector<Index>>& points,
+                                         const TrainingRig& rig, const TrainingRig& some) {
+  std::vector<std::vector<Index>> all(points.size());
+  for (std::size_t m = 0; m < points.size(); ++m) {
+    const std::vector<Index>& of_some = some.some[m];
+    for (const Index k : points[m]) {
+      const Index begin = k == 0 ? 0 : of_some[k - 1] + 1;
+      const Index end = k + 1 < of_some.size() ? of_some[k + 1] : static_cast<Index>(rig.step(m)->points());
+      for (Index i = all[m].empty() ? begin : std::max(begin, all[m].back() + 1); i < end; ++i)
+        all[m].push_back(i);
     }
   }
   return all;
@@ -153,7 +158,10 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     if (!chosen.ok() || chosen->poor.empty()) return chosen;
     TrainOptions rest = options;
     rest.seconds = limit.left();
-    Result<Trained> stepped = TrainOnce(OfTiles(**split, TilesOfAll(chosen->poor, **of_some)), clips, rest);
+    const std::optional<TrainingRig> of_points =
+        OfPoints(**split, AllAbout(chosen->poor, **split, **of_some));
+    Result<Trained> stepped =
+        of_points ? TrainOnce(*of_points, clips, rest) : Status::Invalid("no such points");
     if (!stepped.ok() && stepped.status().kind() == ErrorKind::kInterrupted) return stepped;
     if (stepped.ok() && stepped->ns < kWorthStepping * stepped->full_ns &&
         stepped->ns < kCheaperInner * chosen->ns) {
@@ -167,8 +175,8 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (!split->has_value()) return TrainOnce(rig, clips, options);
   if (options.inner == TrainOptions::Inner::kNever) return TrainOnce(rig, clips, options, mends);
   if (options.inner == TrainOptions::Inner::kAlways) {
-    return TrainOnce(HasTiles(**split, options.stepped) ? OfTiles(**split, options.stepped) : **split, clips,
-                     options);
+    const std::optional<TrainingRig> of_points = OfPoints(**split, options.stepped);
+    return TrainOnce(of_points ? *of_points : **split, clips, options);
   }
   double steps = 0;
   for (std::size_t m = 0; m < (*split)->split.size(); ++m)
@@ -183,8 +191,10 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   TrainOptions rest = options;
   rest.seconds = limit.left();
   std::optional<Trained> some;
-  if (!whole->poor.empty()) {
-    Result<Trained> made = TrainOnce(OfTiles(**split, whole->poor), clips, rest);
+  const std::optional<TrainingRig> of_points =
+      whole->poor.empty() ? std::nullopt : OfPoints(**split, whole->poor);
+  if (of_points) {
+    Result<Trained> made = TrainOnce(*of_points, clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
       NameTried(&*made, kBeforeLastStepOfSome);

@@ -44,8 +44,8 @@ struct TrainOptions {
   // Inner points of last steps (graph/last_step.h) instead of what comes out of these: where that is expected to cost
   // less, or as a subspace has it that learns.
   enum class Inner : std::uint8_t { kIfCheaper, kNever, kAlways } inner = Inner::kIfCheaper;
-  // With kAlways: of these tiles alone, by mesh; without any, of all.
-  std::vector<std::vector<Index>> stepped = {};
+  // With kAlways: of these points alone, by mesh; without any, of all.
+  std::vector<SteppedPoints> stepped = {};
   // Controls that are left at rest, as people write their plugs, as a subspace has it that learns (TrainingRecord::at_rest).
   std::vector<std::string> at_rest = {};
   // Others may be found that are better left at rest (TrainingRecord::at_rest), in a second training.
@@ -84,8 +84,8 @@ struct TrainingRig {
   std::function<Status(std::optional<std::string_view>)> set_clip;
   // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
   std::vector<Compiler::SplitPoints> split = {};
-  // By mesh, the tiles of which alone that is (kpsa/partial_step.h); empty: all. Train's own.
-  std::vector<std::vector<Index>> stepped = {};
+  // By mesh, the points of which alone that is (kpsa/partial_step.h); empty: all. Train's own.
+  std::vector<SteppedPoints> stepped = {};
   // By mesh, the points that training chooses by, ascending; empty: all (kpsa/training/some_points.h). Of so many, one is
   // among them. Train's own.
   std::vector<std::vector<Index>> some = {};

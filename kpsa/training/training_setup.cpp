@@ -85,7 +85,7 @@ std::vector<SubspaceOutput> TrainingSetup::Outputs() const {
     const LastStep* const step = rig.step(m);
     outputs.push_back({mesh.name, step == nullptr ? rig.rows(m, totals[m]) : totals[m],
                        of_light() ? "" : mesh.stages.back().name, step == nullptr ? 0 : step->inner_points(),
-                       rig.stepped.empty() ? std::vector<Index>() : rig.stepped[m]});
+                       rig.stepped.empty() ? SteppedPoints() : rig.stepped[m]});
   }
   return outputs;
 }

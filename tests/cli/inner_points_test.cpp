@@ -1,5 +1,5 @@
 // Subspaces that reconstruct the points before the last step of a deltaMush, and run that step themselves: of all points,
-// or of some tiles.
+// or of some.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "kpsa/partial_step.h"
 #include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
@@ -21,20 +22,34 @@ TrainOptions InnerTraining(TrainOptions::Inner inner = TrainOptions::Inner::kAlw
   return options;
 }
 
-class InnerPoints : public ::testing::TestWithParam<std::vector<Index>> {  // tiles; none: all
+// Which points go through the step: of tiles, as files of version 12 have them, or any. These lie about the bend.
+enum class Stepped : std::uint8_t { kAll, kTiles, kPoints };
+
+class InnerPoints : public ::testing::TestWithParam<Stepped> {
  protected:
   void SetUp() override {
     if (folder_ == nullptr) WriteRig();
     std::shared_ptr<const Subspace>& known = prepared_[GetParam()];
     if (known == nullptr) {
       TrainOptions options = InnerTraining();
-      options.stepped = {GetParam()};
+      options.stepped = {SteppedOf(GetParam())};
       known = TrainRig(folder_->rig(), options);
     }
     trained_ = known;
     ASSERT_NE(trained_, nullptr);
     ASSERT_EQ(trained_->outputs.size(), 1u);
-    EXPECT_EQ(trained_->outputs[0].stepped, GetParam());
+    EXPECT_EQ(trained_->outputs[0].stepped, SteppedOf(GetParam()));
+  }
+  static SteppedPoints SteppedOf(Stepped which) {
+    RigRun run(folder_->rig());
+    const auto total = run.rig.scene.meshes[0].mesh().point_count();
+    if (which == Stepped::kAll) return {};
+    if (which == Stepped::kTiles) return {PointsOfTiles(std::vector<Index>{2, 3}, total), {}};
+    std::vector<Index> points = PointsOfTiles(std::vector<Index>{2, 3}, total);
+    std::erase_if(points, [](Index p) { return p % 37 == 0; });
+    run.target = MakeTarget(run.rig, run.rig.accelerate[0]);
+    const auto split = SplitMeshes(*run.rig.graph, &run.compiler, run.target);
+    return LayOut(*split->at(0).step, points);
   }
   static void WriteRig() {
     folder_ = new HelloFolder;
@@ -50,16 +65,16 @@ class InnerPoints : public ::testing::TestWithParam<std::vector<Index>> {  // ti
   }
   static inline const HelloFolder* folder_ = nullptr;
   static inline std::shared_ptr<const Subspace> trained_;
-  static inline std::map<std::vector<Index>, std::shared_ptr<const Subspace>> prepared_;
+  static inline std::map<Stepped, std::shared_ptr<const Subspace>> prepared_;
 };
 
 TEST_P(InnerPoints, HitsRunNoMushAndKeepTheTolerance) {
   const SubspaceOutput& output = trained_->outputs[0];
-  if (GetParam().empty()) {
+  if (GetParam() == Stepped::kAll) {
     EXPECT_EQ(output.inner, output.points) << "all weights are 1";
   } else {
-    EXPECT_GT(output.inner, output.points) << "what frames of the tiles' border read";
-    EXPECT_LT(output.inner, output.points + GetParam().size() * kTilePoints);
+    EXPECT_GT(output.inner, output.points) << "what frames about the others read";
+    EXPECT_LT(output.inner, 2 * output.points);
   }
   EXPECT_EQ(trained_->outputs[0].name, "column@mush");
   RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = trained_});
@@ -131,7 +146,9 @@ TEST_P(InnerPoints, AreInTheFile) {
   const std::string path = *folder_ / "inner.kpsa";
   ASSERT_TRUE(WriteSubspace(*trained_, path).ok());
   const std::string bytes = folder_->Read(path);
-  EXPECT_NE(bytes.find(GetParam().empty() ? "\"version\":\"10\"" : "\"version\":\"12\""), std::string::npos)
+  const int versions[] = {kInnerVersion, kPartialVersion, kSteppedPointsVersion};
+  EXPECT_NE(bytes.find(fmt::format("\"version\":\"{}\"", versions[static_cast<int>(GetParam())])),
+            std::string::npos)
       << "programs that do not know of them say so";
   const Result<Subspace> read = ReadSubspace(path);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
@@ -143,32 +160,43 @@ TEST_P(InnerPoints, AreInTheFile) {
     EXPECT_TRUE(SameBytes(before.Evaluate().points, after.Evaluate().points));
   }
   const ProcessResult inspected = RunKpsa({"inspect", path});
-  EXPECT_NE(inspected.out.find(GetParam().empty() ? "points before the last step"
-                                                  : "points, and of 2 tiles those before the last step"),
-            std::string::npos)
+  const std::size_t stepped = trained_->outputs[0].stepped.points.size();
+  EXPECT_NE(
+      inspected.out.find(stepped == 0 ? "points before the last step"
+                                      : fmt::format("points, and {} of them before the last step", stepped)),
+      std::string::npos)
       << inspected.out << inspected.err;
   Subspace fewer = *trained_;
   fewer.outputs[0].inner = fewer.outputs[0].points - 1;
   EXPECT_FALSE(ValidateSubspace(fewer).ok());
-  const auto last = static_cast<Index>(trained_->outputs[0].points / kTilePoints);
-  for (const std::vector<Index>& tiles : {std::vector<Index>{1, 1}, {2, 1}, {last + 1}}) {
+  const auto total = static_cast<Index>(trained_->outputs[0].points);
+  for (const std::vector<Index>& points : {std::vector<Index>{1, 1}, {2, 1}, {total}, {5}}) {
     Subspace wrong = *trained_;
-    wrong.outputs[0].stepped = tiles;
-    EXPECT_FALSE(ValidateSubspace(wrong).ok()) << tiles[0];
+    wrong.outputs[0].stepped = {points, {}};
+    EXPECT_FALSE(ValidateSubspace(wrong).ok()) << points[0];
+  }
+  for (const std::vector<Index>& starts : {std::vector<Index>{0, 16}, {16, 32}, {0, 0}, {0, 8}}) {
+    Subspace wrong = *trained_;
+    wrong.outputs[0].stepped = {{5}, starts};
+    EXPECT_FALSE(ValidateSubspace(wrong).ok()) << starts[0] << " " << starts[1];
   }
 }
 
-// Tiles that the rig's step reads other points for.
-TEST_P(InnerPoints, OfOtherTilesAreRefused) {
+// Points about which the rig's step reads others.
+TEST_P(InnerPoints, OfOtherPointsAreRefused) {
   Subspace other = *trained_;
-  other.outputs[0].stepped = {0, 2, 4};
+  other.outputs[0].stepped = {PointsOfTiles(std::vector<Index>{0, 2, 4}, other.outputs[0].points), {}};
   const RigRun run(folder_->rig(), {.subspace = std::make_shared<const Subspace>(std::move(other))});
   ASSERT_FALSE(run.ok());
   EXPECT_NE(run.error.find("train it again"), std::string::npos) << run.error;
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, InnerPoints, ::testing::Values(std::vector<Index>(), std::vector<Index>{2, 3}),
-                         [](const auto& of) { return of.param.empty() ? "AllTiles" : "SomeTiles"; });
+std::string NameOf(const ::testing::TestParamInfo<Stepped>& of) {
+  const char* const names[] = {"AllPoints", "SomeTiles", "SomePoints"};
+  return names[static_cast<int>(of.param)];
+}
+INSTANTIATE_TEST_SUITE_P(Of, InnerPoints,
+                         ::testing::Values(Stepped::kAll, Stepped::kTiles, Stepped::kPoints), NameOf);
 
 // Of some smooth poses, those that hit: more than five, within a tolerance and a half.
 void ExpectHitsNear(const HelloFolder& folder, const std::shared_ptr<const Subspace>& trained,
@@ -259,8 +287,8 @@ TEST(InnerPointsOfRigs, AnotherEnvelopeMisses) {
   }
 }
 
-// Training finds the tiles: those of the bend, and fewer for a larger tolerance; also where it looks at some points.
-TEST(InnerPointsOfRigs, AreOfTheTilesThatNeedThem) {
+// Training finds the points: those of the bend, and fewer for a larger tolerance; also where it looks at some of them.
+TEST(InnerPointsOfRigs, AreOfThePointsThatNeedThem) {
   const HelloFolder folder;
   folder.Edit("mush: {type: deltaMush, iterations: 10}",
               "mush: {type: deltaMush, iterations: 10, parent: lower}");
@@ -276,13 +304,13 @@ TEST(InnerPointsOfRigs, AreOfTheTilesThatNeedThem) {
     const auto trained = TrainRig(folder.rig(), options);
     ASSERT_NE(trained, nullptr);
     const SubspaceOutput& output = trained->outputs[0];
-    stepped.push_back(output.stepped.size());
-    EXPECT_LT(stepped.back(), (output.points + kTilePoints - 1) / kTilePoints);
+    stepped.push_back(output.stepped.points.size());
+    EXPECT_LT(stepped.back(), output.points / 2);
     ExpectHitsNear(folder, trained, tolerance);
   }
   EXPECT_GT(stepped[0], stepped[1]);
   EXPECT_GT(stepped[1], 0u);
-  EXPECT_EQ(stepped[2], 2 * stepped[1]) << "a tile of half of the points covers two";
+  EXPECT_GT(stepped[2], stepped[1]) << "and those between them";
 }
 
 }  // namespace

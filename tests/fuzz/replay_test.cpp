@@ -22,7 +22,9 @@ const std::map<std::string, std::set<std::string>>& CorpusMilestones() {
       {"graph", {"plan", "lazy", "failure", "frames"}},
       {"npz", {"archive", "array", "refused"}},
       {"rig", {"formatted", "template", "include", "reference", "weights", "built", "played", "refused"}},
-      {"subspace", {"content", "hit", "inner points", "inner points of some tiles", "mends", "products", "patches", "refused"}},
+      {"subspace",
+       {"content", "hit", "inner points", "inner points of some tiles", "inner points of some points",
+        "mends", "products", "patches", "refused"}},
       {"weights", {"weights", "shape", "refused"}}};
   return milestones;
 }

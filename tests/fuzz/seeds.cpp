@@ -112,8 +112,11 @@ void WriteSubspaces(const std::string& folder) {
   Subspace before_last_step = s;
   before_last_step.outputs = {{"sheet@mush", 380, "mush", 400}};
   Check(WriteSubspace(before_last_step, folder + "/inner.kpsa"));
-  before_last_step.outputs[0].stepped = {1};
+  before_last_step.outputs[0].stepped.points = PointsOfTiles(std::vector<Index>{1}, 380);
   Check(WriteSubspace(before_last_step, folder + "/stepped.kpsa"));
+  before_last_step.outputs[0].stepped = {{3, 130, 300}, {0, 128, 240, 368}};
+  before_last_step.outputs[0].inner = 400;
+  Check(WriteSubspace(before_last_step, folder + "/points.kpsa"));
   TileMend mend{0, 1, {130, 131}, {129, 130, 131, 132}, std::vector<float>(12, 1.0f), {}};
   mend.map.assign(12 * s.tiles[0].CuesOf(1).size(), 0.5f);
   Subspace mended = s;

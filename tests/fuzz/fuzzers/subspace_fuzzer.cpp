@@ -33,7 +33,9 @@ void Use(const Subspace& s) {
     if (s.doubt_inputs() > 0) Reached("products");
     if (s.patches.tiles > 0) Reached("patches");
     if (s.of_inner()) Reached("inner points");
-    if (s.of_inner() && !s.outputs[0].stepped.empty()) Reached("inner points of some tiles");
+    if (s.of_inner() && !s.outputs[0].stepped.empty())
+      Reached(s.outputs[0].stepped.starts.empty() ? "inner points of some tiles"
+                                                  : "inner points of some points");
     for (const TileMend& mend : s.mends) {
       Matrix4 joint;
       (void)s.tiles[mend.output].JointOf(mend.tile, scratch.y.data(), &joint);

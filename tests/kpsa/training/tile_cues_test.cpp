@@ -122,9 +122,9 @@ TEST(TileCues, BeforeALastStepErrorsCountMore) {
   const Limb limb(true);
   const TileOptions coarse{.rms_budget = 0.1 * kLimbTolerance, .max_budget = 0.5 * kLimbTolerance},
       fine{.rms_budget = 0.04 * kLimbTolerance, .max_budget = 0.2 * kLimbTolerance};
-  const auto stored = [&](const TileOptions& options, std::size_t inner, std::vector<Index> stepped) {
+  const auto stored = [&](const TileOptions& options, std::size_t inner, std::vector<Index> tiles) {
     SubspaceOutput output{"limb@mush", kLimbPoints, "mush", inner};
-    output.stepped = std::move(stepped);
+    output.stepped.points = PointsOfTiles(tiles, kLimbPoints);
     const TileSubspace made = MakeTileSubspace(limb.mean, limb.poses, 0, limb.choice, {output}, options);
     const TileData& data = made.subspace.tiles[0].data();
     return std::pair(data.ranks[0] + 256 * data.counts[0], data.ranks[1] + 256 * data.counts[1]);
@@ -137,7 +137,7 @@ TEST(TileCues, BeforeALastStepErrorsCountMore) {
   EXPECT_EQ(stored(coarse, kLimbPoints, {0}), std::pair(as_fine.first, as_coarse.second));
   EXPECT_EQ(BudgetOfTile({"m@mush", 2 * kTilePoints + 5, "mush", 0}, 2), 1);
   SubspaceOutput some{"m@mush", 2 * kTilePoints + 5, "mush", 3 * kTilePoints};
-  some.stepped = {0};
+  some.stepped.points = PointsOfTiles(std::vector<Index>{0}, some.points);
   EXPECT_LT(BudgetOfTile(some, 0), 1);
   EXPECT_EQ(BudgetOfTile(some, 1), 1);
   EXPECT_EQ(BudgetOfTile(some, 2), BudgetOfTile(some, 0)) << "it holds inner points, too";
@@ -211,7 +211,7 @@ TEST(TileCues, SayWhatTheyWouldMiss) {
   EXPECT_GT(ShareBeyond(TileErrors(limb.poses, blind), kLimbTolerance), 0.5);
 }
 
-TEST(TileCues, SayWhichTilesAreToBlame) {
+TEST(TileCues, SayInHowManyPosesTilesAreBeyond) {
   Eigen::MatrixXf errors = Eigen::MatrixXf::Constant(100, 6, 0.1f);
   errors.col(4).head(40).setConstant(2);
   errors.col(1).segment(38, 10).setConstant(3);
@@ -219,29 +219,6 @@ TEST(TileCues, SayWhichTilesAreToBlame) {
   EXPECT_EQ(ShareBeyond(errors, 1), 0.49);
   const std::size_t but[] = {4};
   EXPECT_EQ(ShareBeyond(errors, 1, but), 0.11);
-  EXPECT_EQ(WorstTiles(errors, 1, 0.49), std::vector<std::size_t>());
-  EXPECT_EQ(WorstTiles(errors, 1, 0.11), (std::vector<std::size_t>{4}));
-  EXPECT_EQ(WorstTiles(errors, 1, 0.01), (std::vector<std::size_t>{1, 4}));
-  EXPECT_EQ(WorstTiles(errors, 1, 0), (std::vector<std::size_t>{0, 1, 4}));
-  const std::vector<std::size_t> none;
-  TileSteps may{std::vector<double>(6, 5.0)};
-  EXPECT_EQ(PoorTiles(errors, 2, may), none) << "half of them are not few";
-  errors(99, 0) = 0;
-  EXPECT_EQ(PoorTiles(errors, 2, may), (std::vector<std::size_t>{1, 4})) << "beyond half of it";
-  may.most = 10;
-  EXPECT_EQ(PoorTiles(errors, 2, may), (std::vector<std::size_t>{1, 4}));
-  may.most = 9;
-  EXPECT_EQ(PoorTiles(errors, 2, may), none) << "their steps are too dear";
-  may = {std::vector<double>(12, 2.0), 7};
-  EXPECT_EQ(PoorTiles(errors, 2, may, 2), none) << "so are those of all that they stand for";
-  may.most = 11;
-  EXPECT_EQ(PoorTiles(errors, 2, may, 2), none) << "among the others are more";
-  may.most = 12;
-  EXPECT_EQ(PoorTiles(errors, 2, may, 2), (std::vector<std::size_t>{1, 4}));
-  may = {std::vector<double>(6, 5.0)};
-  may.ns[4] = 0;
-  EXPECT_EQ(PoorTiles(errors, 2, may), none) << "no step would help that one";
-  EXPECT_EQ(PoorTiles(errors, 2, {}), none);
 }
 
 // The run time's way, against y, the stored joint and the points in its space, one by one.

@@ -1,0 +1,47 @@
+// Points that the maps of their tiles do not tell, so that a last step (graph/last_step.h) should give them instead:
+// mostly few, where a deltaMush turns frames over. Internal to training.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace kpsa::engine {
+
+// Of the poses: so few of them hardly matter.
+inline constexpr double kFewBeyond = 0.005;
+
+// In which poses which points are farther off than some bound. Point k of tile t is number kTilePoints t + k.
+class PointsBeyond {
+ public:
+  PointsBeyond() = default;
+  PointsBeyond(std::size_t poses, std::size_t tiles);
+  // errors: [n x poses], n of the tile. From any thread, another tile each.
+  void Set(std::size_t tile, const Eigen::MatrixXd& errors, double bound);
+  std::size_t poses() const { return poses_; }
+  std::size_t tiles() const { return sizes_.size(); }
+  std::size_t points() const;  // that were set
+
+  // The fewest points, the worst first, without which at most that share of the poses has one beyond; ascending.
+  std::vector<std::size_t> Worst(double share) const;
+
+ private:
+  std::size_t poses_ = 0, words_ = 0;
+  std::vector<std::size_t> sizes_;   // [tiles] points of each
+  std::vector<std::uint64_t> bits_;  // [points x words_], a bit a pose
+};
+
+// The last steps that points of tiles may go through instead.
+struct TileSteps {
+  std::vector<double> ns = {};  // by tile, what its step costs; 0: it has none; empty: none has
+  double most = std::numeric_limits<double>::infinity();  // that all of them may cost
+};
+
+// The fewest points without which the others are beyond in a few poses only; none where these are not few, one of them
+// has no step, or their steps cost too much. Of the tiles of `steps`, these are one of `every`; then they may cost less,
+// since among the others there are more.
+std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps& steps,
+                                    std::size_t every = 1);
+
+}  // namespace kpsa::engine

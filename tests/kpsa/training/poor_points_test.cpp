@@ -1,0 +1,71 @@
+// Which points a last step should give (kpsa/training/poor_points.h).
+#include "kpsa/training/poor_points.h"
+
+#include <gtest/gtest.h>
+
+#include "kpsa/tiles.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kPoorPoses = 200;
+
+// Three tiles, the last one of ten points: point 4 of the first is beyond in many poses, two of the last in some.
+PointsBeyond SomeBeyond() {
+  PointsBeyond beyond(kPoorPoses, 3);
+  for (const std::size_t tile : {2u, 0u, 1u}) {
+    Eigen::MatrixXd errors =
+        Eigen::MatrixXd::Constant(tile == 2 ? 10 : static_cast<Eigen::Index>(kTilePoints), kPoorPoses, 1.0);
+    if (tile == 0) errors.row(4).head(80).setConstant(2);
+    if (tile == 2) errors.row(0).segment(78, 6).setConstant(1.5), errors.row(9).tail(1).setConstant(1.5);
+    beyond.Set(tile, errors, 1);
+  }
+  return beyond;
+}
+
+TEST(PoorPoints, AreTheFewestWithoutWhichFewPosesAreBeyond) {
+  const PointsBeyond beyond = SomeBeyond();
+  EXPECT_EQ(beyond.points(), 2 * kTilePoints + 10);
+  const std::size_t many = 4, some = 2 * kTilePoints, one = 2 * kTilePoints + 9;
+  EXPECT_EQ(beyond.Worst(0), (std::vector<std::size_t>{many, some, one}));
+  EXPECT_EQ(beyond.Worst(0.005), (std::vector<std::size_t>{many, some})) << "one pose of 200 hardly matters";
+  EXPECT_EQ(beyond.Worst(0.034), (std::vector<std::size_t>{many, some}));
+  EXPECT_EQ(beyond.Worst(0.035), (std::vector<std::size_t>{many}));
+  EXPECT_EQ(beyond.Worst(0.42), (std::vector<std::size_t>{many}));
+  EXPECT_EQ(beyond.Worst(0.425), std::vector<std::size_t>()) << "poses count once";
+}
+
+TEST(PoorPoints, AreNoneWhereTheirStepsAreDear) {
+  const PointsBeyond beyond = SomeBeyond();
+  const std::vector<std::size_t> none, poor = beyond.Worst(0);
+  ASSERT_EQ(poor.size(), 3u);
+  TileSteps steps{std::vector<double>(3, kTilePoints * 2.0)};
+  EXPECT_EQ(PoorPoints(beyond, steps), poor);
+  steps.most = 6;
+  EXPECT_EQ(PoorPoints(beyond, steps), poor) << "of so many points, not of all their tiles";
+  steps.most = 5.9;
+  EXPECT_EQ(PoorPoints(beyond, steps), none);
+  steps = {std::vector<double>(6, kTilePoints * 2.0), 17};
+  EXPECT_EQ(PoorPoints(beyond, steps, 2), none) << "tiles stand for two: among the others are more";
+  steps.most = 18;
+  EXPECT_EQ(PoorPoints(beyond, steps, 2), poor);
+  steps = {std::vector<double>(3, 1.0)};
+  steps.ns[2] = 0;
+  EXPECT_EQ(PoorPoints(beyond, steps), none) << "no step would help there";
+  EXPECT_EQ(PoorPoints(beyond, {}), none);
+}
+
+TEST(PoorPoints, AreNoneWhereTheyAreMany) {
+  PointsBeyond beyond(1, 1);
+  Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(9, 1);
+  errors.topRows(3).setConstant(2);
+  beyond.Set(0, errors, 1);
+  const TileSteps steps{{1.0}};
+  EXPECT_EQ(PoorPoints(beyond, steps).size(), 3u);
+  errors.topRows(4).setConstant(2);
+  beyond.Set(0, errors, 1);
+  EXPECT_EQ(PoorPoints(beyond, steps).size(), 0u);
+}
+
+}  // namespace
+}  // namespace kpsa::engine
