@@ -103,6 +103,18 @@ std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<con
   return of_meshes;
 }
 
+// Those of the rows that come out, and those that go through a step already, by mesh.
+std::vector<std::vector<Index>> WithStepped(const TrainingSetup& setup, std::span<const std::size_t> rows) {
+  std::vector<std::vector<Index>> of_meshes;
+  for (const SteppedPoints& stepped : setup.rig.stepped) of_meshes.push_back(stepped.points);
+  for (const std::size_t row : rows) {
+    if (const auto found = setup.PointThatComesOut(row); found)
+      of_meshes[found->first].push_back(found->second);
+  }
+  for (std::vector<Index>& points : of_meshes) std::ranges::sort(points);
+  return of_meshes;
+}
+
 // Of all meshes, where these have a step. cost: of a frame without them.
 TileSteps StepsOfTiles(const TrainingSetup& setup, const std::vector<Compiler::SplitPoints>& steps,
                        double cost) {
@@ -183,8 +195,9 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
     const CueChoice& choice = candidates.cues.choice;
     // Another training has to fit
-    if (ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed())
-      candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
+    const bool has_time = ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed();
+    candidates.may_find_more = has_time && candidates.by_tiles_alone();
+    if (has_time && ends->steps != nullptr) candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
     candidates.dear =
         ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
         std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
@@ -192,13 +205,21 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     Result<std::optional<Subspace>> best = candidates.Best();
     if (!best.ok()) return best.status();
     if (!*best) {
+      if (candidates.by_tiles_alone() && !candidates.poor.empty()) {
+        Trained trained;
+        trained.ended = true, trained.poor = WithStepped(setup, candidates.poor);
+        return trained;
+      }
       if (candidates.by_tiles_alone()) return Status::Invalid("no cues of tiles serve");
       record.tried.push_back({kForAllPoints, choice.cues.size(),
                               static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
                               choice.cost / setup.full_cost, false});
       Trained trained;
       trained.record = std::move(record), trained.ended = true, trained.held = setup.sampler->held();
-      trained.ns = choice.cost, trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
+      const Result<double> least = candidates.LeastForAllPoints();
+      if (!least.ok()) return least.status();
+      trained.ns = std::max(choice.cost, *least + choice.misses * setup.full_cost);
+      trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
       if (!candidates.poor.empty()) trained.poor = ByMesh(setup, candidates.poor);
       return trained;
     }

@@ -29,10 +29,12 @@ struct Trained {
 };
 
 // Where a training may end without a subspace: with its cues, where these are points that come out, a frame is expected
-// to cost more than `enough`, and no cues of tiles serve; or with points of meshes with steps, which are to blame for that.
+// to cost more than `enough`, and no cues of tiles serve; or with points of meshes with steps, which are to blame for that
+// (and those that go through one already).
 struct Ends {
   double enough = std::numeric_limits<double>::infinity();
-  const std::vector<Compiler::SplitPoints>* steps = nullptr;  // by mesh
+  const std::vector<Compiler::SplitPoints>* steps =
+      nullptr;  // by mesh; null: some points go through them already
 };
 
 // mends: last steps by which points may be mended, by mesh; or none. ends: null where there is to be a subspace. Errors:

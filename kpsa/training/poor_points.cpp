@@ -24,13 +24,16 @@ PointsBeyond::PointsBeyond(std::size_t poses, std::size_t tiles)
       sizes_(tiles),
       bits_(tiles * kTilePoints * words_) {}
 
-void PointsBeyond::Set(std::size_t tile, const Eigen::MatrixXd& errors, double bound) {
+void PointsBeyond::Set(std::size_t tile, const Eigen::MatrixXd& errors, double bound, double bound_of_clips,
+                       std::size_t clip_poses) {
   KPSA_CHECK_EQ(static_cast<std::size_t>(errors.cols()), poses_);
   KPSA_CHECK_LE(static_cast<std::size_t>(errors.rows()), kTilePoints);
   sizes_[tile] = static_cast<std::size_t>(errors.rows());
   for (std::size_t t = 0; t < poses_; ++t) {
     for (std::size_t k = 0; k < sizes_[tile]; ++k) {
-      if (!(errors(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(t)) > bound)) continue;
+      if (!(errors(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(t)) >
+            (t < clip_poses ? bound_of_clips : bound)))
+        continue;
       bits_[(tile * kTilePoints + k) * words_ + t / kWordBits] |= std::uint64_t{1} << t % kWordBits;
     }
   }

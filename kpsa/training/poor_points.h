@@ -17,8 +17,10 @@ class PointsBeyond {
  public:
   PointsBeyond() = default;
   PointsBeyond(std::size_t poses, std::size_t tiles);
-  // errors: [n x poses], n of the tile. From any thread, another tile each.
-  void Set(std::size_t tile, const Eigen::MatrixXd& errors, double bound);
+  // errors: [n x poses], n of the tile. bound_of_clips: of the first poses, which are of clips. From any thread, another
+  // tile each.
+  void Set(std::size_t tile, const Eigen::MatrixXd& errors, double bound, double bound_of_clips,
+           std::size_t clip_poses);
   std::size_t poses() const { return poses_; }
   std::size_t tiles() const { return sizes_.size(); }
   std::size_t points() const;  // that were set

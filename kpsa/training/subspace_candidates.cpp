@@ -28,7 +28,9 @@ constexpr double kClearly = 0.5;        // of the expected cost of the others: c
 constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
-constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
+// Of a tile about points that go through a step: more than elsewhere moves these
+constexpr std::size_t kMostCuesOfStepped = 160, kMostPointsOfStepped = 20;
+constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 
 }  // namespace
 
@@ -335,7 +337,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   tried_tiles = true;
   TileCueOptions choice;
   choice.tolerance = setup->options.tolerance;
-  choice.mean = &modes->mean;
+  choice.mean = &modes->mean, choice.clip_poses = poses->clip_poses;
   choice.turn_reach = kTurnReach * modes->diagonal;
   const auto add = [&](Index scalar) {
     const CueRef cue{CueKind::kScalar, scalar};
@@ -348,8 +350,10 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
     if (!setup->recorder->signals()[s].matrix) add(first[s]);
   }
   if (by_tiles_alone()) {  // all have been tried
+    choice.most_cues = kMostCuesOfStepped, choice.most_points = kMostPointsOfStepped;
     tiles = kpsa::engine::ChooseTiles(modes->pca.mean, poses->poses, tile_candidates_, choice);
-    return true;
+    if (may_find_more) poor = FindMorePoor();
+    return poor.empty();
   }
   TilePromise promise{cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
                       kMostBeyondOfMisses * cues.choice.misses, steps, dear};
@@ -358,6 +362,18 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
       ChoosePromisingTiles(modes->pca.mean, poses->poses, tile_candidates_, choice, promise, &trial_, &tiles);
   poor = std::move(chosen.poor);
   return chosen.promising;
+}
+
+// Tiles with inner points are others than those that said which points need them, and so are their cues.
+std::vector<std::size_t> SubspaceCandidates::FindMorePoor() const {
+  PointsBeyond beyond;
+  TileErrors(poses->poses, tiles, {}, &beyond);
+  const auto as_they_come_out = [&](std::vector<std::size_t> rows) {
+    std::erase_if(rows, [&](std::size_t row) { return !setup->PointThatComesOut(row); });
+    return rows;
+  };
+  if (as_they_come_out(beyond.Worst(kFewBeyond)).empty()) return {};
+  return as_they_come_out(beyond.Worst(0));
 }
 
 TileSubspace SubspaceCandidates::OfTiles(bool finely) {

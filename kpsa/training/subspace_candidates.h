@@ -58,11 +58,13 @@ struct SubspaceCandidates {
   // What comes out of a last step is dear to measure: cues of tiles are tried, and where these do not serve, nothing is
   // made of it
   bool dear = false;
-  TileSteps steps = {};                // that some points may go through, in another training
-  std::vector<std::size_t> poor = {};  // they alone are to blame that cues of tiles are not promising
-  FrameCost cost = {};                 // by the last calibration, but points
-  TileChoice tiles = {};               // where they were tried
-  RangeFinder ranges_of_tiles = {};    // of the poses that these alone were trained on
+  TileSteps steps = {};  // that some points may go through, in another training
+  // Points, of the rows that are trained on (PointsBeyond): they alone are to blame that cues of tiles are not promising
+  std::vector<std::size_t> poor = {};
+  bool may_find_more = false;        // of these, besides those that go through a step already
+  FrameCost cost = {};               // by the last calibration, but points
+  TileChoice tiles = {};             // where they were tried
+  RangeFinder ranges_of_tiles = {};  // of the poses that these alone were trained on
   // What was not taken, not calibrated: with cues for all points, where those of tiles were; without tiles where nobody made
   // it, or not finely
   Subspace others = {};
@@ -84,6 +86,8 @@ struct SubspaceCandidates {
   Result<std::optional<Subspace>> Best();
 
   bool IsWorthTrying(const FrameCost& of) const;
+  // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
+  Result<double> LeastForAllPoints() const;
   double alike() const;         // at how much more cues of tiles are taken
   bool by_tiles_alone() const;  // the rig has some points before a last step
   // Nobody knows what all points would measure.
@@ -102,8 +106,6 @@ struct SubspaceCandidates {
   Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
   std::size_t TileCount() const;
   bool HasManyTiles() const { return TileCount() >= setup->options.many_tiles; }
-  // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
-  Result<double> LeastForAllPoints() const;
   // False: with nothing.
   Result<bool> CompareWithTiles(Subspace* subspace);
   // With what was cheaper but for its misses, by the judges that compare subspaces.
@@ -112,6 +114,7 @@ struct SubspaceCandidates {
   void Tried(const char* what, const CueSet& of, double misses, double ns);
   Status AddPosesForTiles();
   Status FindCandidatesOfTiles();
+  std::vector<std::size_t> FindMorePoor() const;
   Result<PricedTiles> PriceTiles();
 
   std::vector<TileCandidates> tile_candidates_ = {}, learning_tiles_ = {};

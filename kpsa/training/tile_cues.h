@@ -27,6 +27,7 @@ struct TileCandidates {
 struct TileCueOptions {
   double tolerance = 1e-4;                // scene units
   const Eigen::VectorXd* mean = nullptr;  // of the poses' columns
+  std::size_t clip_poses = 0;             // the first poses are of clips
   std::vector<CueRef> values;             // that may move any tile: weights of morph targets, envelopes
   double turn_reach = 0;  // scene units that an entry of a rotation, or a value, moves points, about
   std::size_t most_cues = 100, most_points = 12;  // of a tile: scalars, and points

@@ -17,7 +17,9 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kPoor = 0.4;
+// Of the tolerance: a point that is farther off in one pose goes through a last step, if it can; clips come back to their
+// poses, and go on from there
+constexpr double kPoor = 0.5, kPoorInClips = 0.25;
 constexpr double kBeforeStep = 0.4;     // of the budgets of a tile that gives what a last step reads
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
@@ -151,6 +153,7 @@ void FinishTiles(TileSubspace* made) {
 Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, std::span<const TileModel> fits,
                            PointsBeyond* beyond) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
+  const double tolerance = choice.options.tolerance;
   if (beyond != nullptr) *beyond = PointsBeyond(poses.poses(), choice.candidates.size());
   Eigen::MatrixXf errors(count, static_cast<Eigen::Index>(choice.candidates.size()));
   ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -164,7 +167,8 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, st
                                 MultiplyFloats(GemmOperand::Dense(fitted.gain), GemmOperand::Dense(measured));
       const Eigen::MatrixXd off = PointErrors(fitted.target - told);
       errors.col(static_cast<Eigen::Index>(t)) = off.colwise().maxCoeff().cast<float>();
-      if (beyond != nullptr) beyond->Set(t, off, kPoor * choice.options.tolerance);
+      if (beyond != nullptr)
+        beyond->Set(t, off, kPoor * tolerance, kPoorInClips * tolerance, choice.options.clip_poses);
     }
   });
   return errors;

@@ -8,6 +8,7 @@
 #include "kpsa/training/frame_cost.h"
 #include "kpsa/training/one_training.h"
 #include "kpsa/training/some_points.h"
+#include "kpsa/training/subspace_candidates.h"
 #include "kpsa/training/time_limit.h"
 #include "kpsa/training/training_cancel.h"
 
@@ -21,6 +22,8 @@ constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
 // and of that, what it costs then
 constexpr double kDearFollowing = 0.5, kCheaperAtRest = 0.75;
 constexpr const char* kNotLeft = "no second training that leaves controls at rest which this one gets wrong";
+// Of what a training that ended is expected to cost, which knows its cues and some of its tiles: what it comes to, about
+constexpr double kOfExpected = 1.3;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some points, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
@@ -128,6 +131,23 @@ std::vector<std::vector<Index>> AllAbout(const std::vector<std::vector<Index>>& 
   return all;
 }
 
+// With a step of these points alone; where it turns out that a few more need it, with these. Ends as TrainOnce does.
+Result<Trained> TrainStepped(const TrainingRig& split, const std::vector<std::vector<Index>>& points,
+                             const std::vector<TrainingClip>& clips, TrainOptions options) {
+  const TimeLimit limit(options.seconds);
+  std::optional<TrainingRig> of_points = OfPoints(split, points);
+  if (!of_points) return Status::Invalid("no such points");
+  const Ends more;
+  Result<Trained> trained = TrainOnce(*of_points, clips, options, {}, &more);
+  if (trained.ok() && trained->ended) {
+    of_points = OfPoints(split, trained->poor);
+    options.seconds = limit.left();
+    trained = TrainOnce(*of_points, clips, options);
+  }
+  if (trained.ok()) NameTried(&*trained, kBeforeLastStepOfSome);
+  return trained;
+}
+
 // What a frame is expected to cost that is made as the clips are (ns).
 double CostOfClips(const Trained& trained) {
   if (trained.ended || !trained.lost_of_clips) return trained.ns;
@@ -158,14 +178,10 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     if (!chosen.ok() || chosen->poor.empty()) return chosen;
     TrainOptions rest = options;
     rest.seconds = limit.left();
-    const std::optional<TrainingRig> of_points =
-        OfPoints(**split, AllAbout(chosen->poor, **split, **of_some));
-    Result<Trained> stepped =
-        of_points ? TrainOnce(*of_points, clips, rest) : Status::Invalid("no such points");
+    Result<Trained> stepped = TrainStepped(**split, AllAbout(chosen->poor, **split, **of_some), clips, rest);
     if (!stepped.ok() && stepped.status().kind() == ErrorKind::kInterrupted) return stepped;
     if (stepped.ok() && stepped->ns < kWorthStepping * stepped->full_ns &&
         stepped->ns < kCheaperInner * chosen->ns) {
-      NameTried(&*stepped, kBeforeLastStepOfSome);
       AddTried(*chosen, &*stepped);
       return stepped;
     }
@@ -191,15 +207,14 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   TrainOptions rest = options;
   rest.seconds = limit.left();
   std::optional<Trained> some;
-  const std::optional<TrainingRig> of_points =
-      whole->poor.empty() ? std::nullopt : OfPoints(**split, whole->poor);
-  if (of_points) {
-    Result<Trained> made = TrainOnce(*of_points, clips, rest);
+  if (!whole->poor.empty()) {
+    Result<Trained> made = TrainStepped(**split, whole->poor, clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
-      NameTried(&*made, kBeforeLastStepOfSome);
-      // The steps of all tiles cost half of that by themselves
-      if (made->ns < enough && CostOfClips(*made) < kCheaperInner * of_whole) {
+      // The steps of all points cost half of that by themselves. With many tiles cues of these are taken at more
+      const double alike = (whole->ended ? kOfExpected : 1) *
+                           (made->subspace.tile_count() < options.many_tiles ? kCheaperInner : kAlikeOfMany);
+      if (made->ns < enough && CostOfClips(*made) < alike * of_whole) {
         AddTried(*whole, &*made);
         return made;
       }

@@ -90,6 +90,22 @@ std::vector<SubspaceOutput> TrainingSetup::Outputs() const {
   return outputs;
 }
 
+std::optional<std::pair<std::size_t, Index>> TrainingSetup::PointThatComesOut(std::size_t row) const {
+  for (std::size_t m = 0; m < totals.size(); ++m) {
+    const std::size_t rows = (rig.rows(m, totals[m]) + kTilePoints - 1) / kTilePoints * kTilePoints;
+    if (row >= rows) {
+      row -= rows;
+      continue;
+    }
+    if (rig.stepped[m].empty()) return std::pair(m, static_cast<Index>(row));
+    const auto [begin, end] = rig.stepped[m].PointsOf(row / kTilePoints, totals[m]);
+    const auto point = static_cast<Index>(begin + row % kTilePoints);
+    if (point >= end || rig.stepped[m].Has(point)) return std::nullopt;
+    return std::pair(m, point);
+  }
+  return std::nullopt;
+}
+
 double TrainingSetup::CostOfSteps() const {
   double ns = 0;
   for (std::size_t m = 0; m < rig.target.meshes.size(); ++m)

@@ -18,7 +18,7 @@ PointsBeyond SomeBeyond() {
         Eigen::MatrixXd::Constant(tile == 2 ? 10 : static_cast<Eigen::Index>(kTilePoints), kPoorPoses, 1.0);
     if (tile == 0) errors.row(4).head(80).setConstant(2);
     if (tile == 2) errors.row(0).segment(78, 6).setConstant(1.5), errors.row(9).tail(1).setConstant(1.5);
-    beyond.Set(tile, errors, 1);
+    beyond.Set(tile, errors, 1, 1.9, 78);
   }
   return beyond;
 }
@@ -33,6 +33,14 @@ TEST(PoorPoints, AreTheFewestWithoutWhichFewPosesAreBeyond) {
   EXPECT_EQ(beyond.Worst(0.035), (std::vector<std::size_t>{many}));
   EXPECT_EQ(beyond.Worst(0.42), (std::vector<std::size_t>{many}));
   EXPECT_EQ(beyond.Worst(0.425), std::vector<std::size_t>()) << "poses count once";
+}
+
+TEST(PoorPoints, OfClipsHaveABoundOfTheirOwn) {
+  PointsBeyond beyond(4, 1);
+  Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(3, 4);
+  errors(0, 1) = errors(1, 2) = 1.5;
+  beyond.Set(0, errors, 2, 1, 2);
+  EXPECT_EQ(beyond.Worst(0), std::vector<std::size_t>{0}) << "the first two poses are of clips";
 }
 
 TEST(PoorPoints, AreNoneWhereTheirStepsAreDear) {
@@ -59,11 +67,11 @@ TEST(PoorPoints, AreNoneWhereTheyAreMany) {
   PointsBeyond beyond(1, 1);
   Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(9, 1);
   errors.topRows(3).setConstant(2);
-  beyond.Set(0, errors, 1);
+  beyond.Set(0, errors, 1, 1, 0);
   const TileSteps steps{{1.0}};
   EXPECT_EQ(PoorPoints(beyond, steps).size(), 3u);
   errors.topRows(4).setConstant(2);
-  beyond.Set(0, errors, 1);
+  beyond.Set(0, errors, 1, 1, 0);
   EXPECT_EQ(PoorPoints(beyond, steps).size(), 0u);
 }
 
