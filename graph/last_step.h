@@ -34,7 +34,7 @@ class LastStep {
 
   virtual ~LastStep() = default;
   virtual std::size_t points() const = 0;  // that come in, and out: of the whole mesh
-  // At least as many: inner point i < points() belongs to point i.
+  // At least as many. Of what a node gives, inner point i < points() belongs to point i.
   virtual std::size_t inner_points() const = 0;
   virtual Index PointOf(Index inner) const = 0;  // that an inner point belongs to
   virtual float cost_ns() const = 0;             // of a Run for all points

@@ -77,7 +77,7 @@ class PartialBound final : public LastStep::Bound {
       inner_.push_back(found->second);
     }
     std::ranges::sort(inner_);
-    inner_.erase(std::ranges::unique(inner_).begin(), inner_.end());
+    inner_.erase(std::unique(inner_.begin(), inner_.end()), inner_.end());
   }
   const std::vector<Index>& inner() const override { return inner_; }
   std::size_t scratch_floats() const override {

@@ -204,7 +204,7 @@ Status PoseRecorder::CheckFinite(std::span<const float> row) const {
       if (const LastStep* step = rig_.step(m); step != nullptr) {
         if (point < step->inner_points())
           return Status::Evaluation("point {} of {} is not a number before its last step",
-                                    std::min(point, step->points() - 1), mesh.name);
+                                    step->PointOf(static_cast<Index>(point)), mesh.name);
         point -= step->inner_points();
         continue;
       }

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/check.h"
 #include "kpsa/partial_step.h"
 #include "kpsa/training/frame_cost.h"
 #include "kpsa/training/one_training.h"
@@ -115,7 +116,7 @@ std::size_t PointsOf(const TrainingRig& some) {
   for (const std::vector<Index>& of_mesh : some.some) points += of_mesh.size();
   return points;
 }
-// All points of the tiles that these points lie in, which are of some of many: what lies between is not known.
+// Of all points these, which are of some of many, and those up to the next ones of them: what lies between is not known.
 std::vector<std::vector<Index>> AllAbout(const std::vector<std::vector<Index>>& points,
                                          const TrainingRig& rig, const TrainingRig& some) {
   std::vector<std::vector<Index>> all(points.size());
@@ -141,6 +142,7 @@ Result<Trained> TrainStepped(const TrainingRig& split, const std::vector<std::ve
   Result<Trained> trained = TrainOnce(*of_points, clips, options, {}, &more);
   if (trained.ok() && trained->ended) {
     of_points = OfPoints(split, trained->poor);
+    KPSA_CHECK(of_points.has_value());  // they are laid out anew
     options.seconds = limit.left();
     trained = TrainOnce(*of_points, clips, options);
   }
