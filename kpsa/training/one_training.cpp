@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // Of what a frame is expected to cost otherwise: what steps of some tiles may cost, since tiles have their cost besides
 constexpr double kMostInSteps = 0.5;
+// Of a full frame: where cues for all points cost less, other trainings are not worth their time
+constexpr double kWorthPoints = 0.2;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -197,7 +199,8 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     // Another training has to fit
     const bool has_time = ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed();
     candidates.may_find_more = has_time && candidates.by_tiles_alone();
-    if (has_time && ends->steps != nullptr) candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
+    if (has_time && ends->steps != nullptr && choice.cost > kWorthPoints * setup.full_cost)
+      candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
     candidates.dear =
         ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
         std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
