@@ -485,6 +485,7 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
                   std::span<const Index> places) const {
   if (outs.empty()) return;
   KPSA_CHECK(places.empty() || places.size() == tiles.size());
+  for (const Index place : places) KPSA_CHECK(place % 16 == 0 && place < outs[0].count);
   for (const PointsView& out : outs) KPSA_CHECK(!places.empty() || out.count == data_.points);
   KPSA_CHECK(spaces.empty() || (spaces.size() == outs.size() && data_.components == 3));
   for (std::size_t i = 0; i < tiles.size(); ++i)

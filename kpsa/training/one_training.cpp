@@ -89,26 +89,10 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
   return trained;
 }
 
-// Points of the tiles of all meshes, by mesh: point k of tile t is kTilePoints t + k.
-std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<const std::size_t> points) {
-  std::vector<std::vector<Index>> of_meshes;
-  std::size_t first = 0;
-  for (std::size_t m = 0; m < setup.totals.size(); ++m) {
-    const std::size_t count =
-        (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints * kTilePoints;
-    std::vector<Index>& own = of_meshes.emplace_back();
-    for (const std::size_t point : points) {
-      if (point >= first && point < first + count) own.push_back(static_cast<Index>(point - first));
-    }
-    first += count;
-  }
-  return of_meshes;
-}
-
-// Those of the rows that come out, and those that go through a step already, by mesh.
+// The points of these rows, as far as they come out, and those that go through a step already; by mesh.
 std::vector<std::vector<Index>> WithStepped(const TrainingSetup& setup, std::span<const std::size_t> rows) {
-  std::vector<std::vector<Index>> of_meshes;
-  for (const SteppedPoints& stepped : setup.rig.stepped) of_meshes.push_back(stepped.points);
+  std::vector<std::vector<Index>> of_meshes(setup.totals.size());
+  for (std::size_t m = 0; m < setup.rig.stepped.size(); ++m) of_meshes[m] = setup.rig.stepped[m].points;
   for (const std::size_t row : rows) {
     if (const auto found = setup.PointThatComesOut(row); found)
       of_meshes[found->first].push_back(found->second);
@@ -223,7 +207,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       if (!least.ok()) return least.status();
       trained.ns = std::max(choice.cost, *least + choice.misses * setup.full_cost);
       trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
-      if (!candidates.poor.empty()) trained.poor = ByMesh(setup, candidates.poor);
+      if (!candidates.poor.empty()) trained.poor = WithStepped(setup, candidates.poor);
       return trained;
     }
     made = std::move(*best);

@@ -40,9 +40,8 @@ struct TileSteps {
   double most = std::numeric_limits<double>::infinity();  // that all of them may cost
 };
 
-// The fewest points without which the others are beyond in a few poses only; none where these are not few, one of them
-// has no step, or their steps cost too much. Of the tiles of `steps`, these are one of `every`; then they may cost less,
-// since among the others there are more.
+// The points that are beyond in any pose; none where these are not few, one of them has no step, or their steps cost too
+// much. Of the tiles of `steps`, these are one of `every`; then they may cost less, since among the others there are more.
 std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps& steps,
                                     std::size_t every = 1);
 

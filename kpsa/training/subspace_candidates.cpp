@@ -365,9 +365,10 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
 }
 
 // Tiles with inner points are others than those that said which points need them, and so are their cues.
-std::vector<std::size_t> SubspaceCandidates::FindMorePoor() const {
+std::vector<std::size_t> SubspaceCandidates::FindMorePoor() {
   PointsBeyond beyond;
-  TileErrors(poses->poses, tiles, {}, &beyond);
+  fits_ = FitTiles(tiles, poses->poses);
+  TileErrors(poses->poses, tiles, fits_, &beyond);
   const auto as_they_come_out = [&](std::vector<std::size_t> rows) {
     std::erase_if(rows, [&](std::size_t row) { return !setup->PointThatComesOut(row); });
     return rows;

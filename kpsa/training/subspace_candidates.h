@@ -114,7 +114,7 @@ struct SubspaceCandidates {
   void Tried(const char* what, const CueSet& of, double misses, double ns);
   Status AddPosesForTiles();
   Status FindCandidatesOfTiles();
-  std::vector<std::size_t> FindMorePoor() const;
+  std::vector<std::size_t> FindMorePoor();
   Result<PricedTiles> PriceTiles();
 
   std::vector<TileCandidates> tile_candidates_ = {}, learning_tiles_ = {};

@@ -134,6 +134,17 @@ TileModel ModelOf(const TileChoice& choice, std::size_t tile, const PoseMatrix& 
   return fitted;
 }
 
+std::vector<TileModel> FitTiles(const TileChoice& choice, const PoseMatrix& poses) {
+  std::vector<TileModel> fits(choice.candidates.size());
+  ParallelFor(fits.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      fits[t] = ModelOf(choice, t, poses, choice.candidates[t], choice.options);
+      fits[t].target = {};
+    }
+  });
+  return fits;
+}
+
 TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size_t clip_poses) {
   TileInputs inputs;
   inputs.samples = SampledColumns(choice.measured);

@@ -58,6 +58,8 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.
 TileModel ModelOf(const TileChoice& choice, std::size_t tile, const PoseMatrix& poses,
                   const TileCandidates& points, const TileCueOptions& options);
+// All of them, without their targets, as MakeTileSubspace takes them.
+std::vector<TileModel> FitTiles(const TileChoice& choice, const PoseMatrix& poses);
 // What all tiles of a choice are made with.
 TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size_t clip_poses);
 
@@ -65,7 +67,8 @@ TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size
 void FinishTiles(TileSubspace* made);
 
 // How far off a point of each tile of the choice would be in each of the same poses, were they stored exactly.
-// [poses x tiles]; fits: as MakeTileSubspace has them, or empty. beyond: which points are beyond half the tolerance.
+// [poses x tiles]; fits: as MakeTileSubspace has them, or empty. beyond: which points are beyond half the
+// tolerance, or a quarter in a frame of a clip.
 Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
                            std::span<const TileModel> fits = {}, PointsBeyond* beyond = nullptr);
 // Share of the poses in which a tile is farther off, but some of them.

@@ -97,7 +97,7 @@ std::optional<std::pair<std::size_t, Index>> TrainingSetup::PointThatComesOut(st
       row -= rows;
       continue;
     }
-    if (rig.stepped[m].empty()) return std::pair(m, static_cast<Index>(row));
+    if (rig.stepped.empty() || rig.stepped[m].empty()) return std::pair(m, static_cast<Index>(row));
     const auto [begin, end] = rig.stepped[m].PointsOf(row / kTilePoints, totals[m]);
     const auto point = static_cast<Index>(begin + row % kTilePoints);
     if (point >= end || rig.stepped[m].Has(point)) return std::nullopt;

@@ -31,7 +31,7 @@ struct TrainingSetup {
   Result<double> CostOfPoints(std::span<const CueRef> cues);
   double CostOfSteps() const;  // likewise, of the last steps after inner points
   // The mesh and the point that a row of the tiles of all meshes (row k of tile t is kTilePoints t + k) is, where only some
-  // points go through a last step; none where it is one of these, or what the step reads besides.
+  // points go through a last step, or none does; nothing where it is one of these, or what the step reads besides.
   std::optional<std::pair<std::size_t, Index>> PointThatComesOut(std::size_t row) const;
 
   const TrainingRig rig;                  // its controls are the rig's, then tilts
