@@ -190,8 +190,8 @@ and took turns with the full evaluation in one run.
 
 The clip is \`talk\`. A key point behind a deltaMush needs all points around it, so key points of the output drag in much of the mesh: paper
 mode has no advantage here. The default measures before it, and where that does not tell enough, a few points behind it, too
-(docs/decisions/15-worst-output-points-as-cues.md), or it stands for the points before the mush's last step and runs that itself, as for the
-animal (docs/decisions/27-points-before-the-last-step.md): its error is then no longer split.
+(docs/decisions/15-worst-output-points-as-cues.md), or it stands for the points before the mush's last step and runs that itself, of all (the car)
+or of those that need it (docs/decisions/27-points-before-the-last-step.md, 36-last-steps-of-single-points.md): its error is then no longer split.
 
 END
   cat "$work/main.md"
