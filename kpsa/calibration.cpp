@@ -118,13 +118,19 @@ double MostlyRightUpTo(std::vector<ToldPose> poses, double largest) {
   return poses.empty() || up_to == poses.back().score ? largest : up_to;
 }
 
+// How much farther than what was seen the score may go, where all that was seen is right: what scores speak of makes
+// errors that grow no faster than its square (kpsa/calibration.h).
+double ReachBeyond(double worst_error, double tolerance) {
+  return worst_error > 0 ? std::clamp(std::sqrt(tolerance / worst_error), 1.0, kMostBeyondSeen) : 1;
+}
+
 // The largest tau that all demands allow, or 0.
 double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, const Calibration& wanted) {
   const double c = wanted.threshold.blend_start;
   std::map<int, KindPoses> kinds;
   std::vector<double> severe, candidates;
   std::vector<ToldPose> told;
-  double largest_score = 0;
+  double largest_score = 0, worst_error = 0;
   bool by_patch = false;
   for (const CalibrationPair& pair : pairs) {
     KindPoses& kind = kinds[pair.kind];
@@ -135,6 +141,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(AcceptedFrom(pair));
     by_patch = by_patch || (!pair.patches.empty() && !pair.blends_only);
     if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
+    if (pair.guard < 1) worst_error = std::max(worst_error, std::isnan(pair.error) ? kInfinity : pair.error);
     if (pair.guard == 0 && std::isfinite(pair.score) && pair.kind != static_cast<int>(PoseKind::kBeyond))
       told.push_back({pair.score, !(pair.error <= tolerance)});
     for (const double limit : {kind.limits.back(), severe.back()}) {
@@ -143,6 +150,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
   }
   // Where patches miss by themselves, what scores high is exact where it would be wrong
   if (!by_patch) largest_score = MostlyRightUpTo(std::move(told), largest_score);
+  largest_score *= ReachBeyond(worst_error, tolerance);
   const double cap = largest_score / c * (1 + 1e-12);
   for (double& candidate : candidates) candidate = std::min(candidate, cap);
   candidates.push_back(cap);

@@ -25,6 +25,7 @@ inline constexpr double kCalibrationConfidence = 0.9;
 inline constexpr double kSevere = 3;         // tolerances: a violation beyond them is a severe one
 inline constexpr double kSevereShare = 0.1;  // of alpha: what may be severe
 inline constexpr double kShareOfHits = 2;    // in alphas: violations among the hits
+inline constexpr double kMostBeyondSeen = 1.5;
 
 // The guard of a pose of which guards ask for patches alone: no hit, and nothing of the others is asked for.
 inline constexpr double kSomeGuard = 1e-12;
@@ -82,8 +83,10 @@ struct Calibration {
 };
 
 // tolerance 0 or less: never hit; infinite: always. blend_start is c in (0, 1]. Where no pose forbids it, tau
-// ends at the largest calibration score / c: beyond what was seen nothing is promised. Pairs with a NaN count
-// as violations. A larger tolerance never gives a smaller threshold.
+// ends at the largest calibration score / c, as beyond what was seen nothing is promised; but where all that was
+// seen is right, by a margin, this reaches farther by the root of tolerance / largest error, up to kMostBeyondSeen
+// times. A score is a distance from what was trained on, or what products of its cues make (second order), so the
+// square is cautious. Pairs with a NaN count as violations. A larger tolerance never gives a smaller threshold.
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
                       double blend_start = kBlendStart, double confidence = kCalibrationConfidence);
 

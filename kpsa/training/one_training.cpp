@@ -15,8 +15,9 @@ namespace {
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // Of what a frame is expected to cost otherwise: what steps of some tiles may cost, since tiles have their cost besides
 constexpr double kMostInSteps = 0.5;
-// Of a full frame: where cues for all points cost less, other trainings are not worth their time
-constexpr double kWorthPoints = 0.2;
+// Of the points: so few may be to blame that the others are worth their time; fewer, where cues for all points are expected
+// to cost less than that, of a full frame
+constexpr double kMostPoor = 1.0 / 3, kMostPoorOfCheap = 0.05, kCheapPoints = 0.2;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -104,7 +105,9 @@ std::vector<std::vector<Index>> WithStepped(const TrainingSetup& setup, std::spa
 // Of all meshes, where these have a step. cost: of a frame without them.
 TileSteps StepsOfTiles(const TrainingSetup& setup, const std::vector<Compiler::SplitPoints>& steps,
                        double cost) {
-  TileSteps tiles{{}, kMostInSteps * cost};
+  TileSteps tiles;
+  tiles.most = kMostInSteps * cost;
+  tiles.most_points = cost > kCheapPoints * setup.full_cost ? kMostPoor : kMostPoorOfCheap;
   for (std::size_t m = 0; m < setup.totals.size(); ++m) {
     const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
     const double ns = steps[m].step == nullptr ? 0 : static_cast<double>(steps[m].step->cost_ns());
@@ -183,8 +186,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     // Another training has to fit
     const bool has_time = ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed();
     candidates.may_find_more = has_time && candidates.by_tiles_alone();
-    if (has_time && ends->steps != nullptr && choice.cost > kWorthPoints * setup.full_cost)
-      candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
+    if (has_time && ends->steps != nullptr) candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
     candidates.dear =
         ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
         std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });

@@ -12,8 +12,6 @@ namespace {
 
 // Of what steps may cost, where some tiles stand for all: among the others are more that need one
 constexpr double kOfMost = 0.7;
-// Of the points: so few may be to blame that the others are worth their time
-constexpr double kMostPoor = 1.0 / 3;
 constexpr std::size_t kWordBits = 64;
 
 }  // namespace
@@ -77,8 +75,8 @@ std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps&
     all_step = all_step && of_tile > 0;
     ns += of_tile / kTilePoints * static_cast<double>(every);
   }
-  if (static_cast<double>(worst.size()) > kMostPoor * static_cast<double>(beyond.points()) || !all_step ||
-      ns > (every > 1 ? kOfMost : 1) * steps.most)
+  if (static_cast<double>(worst.size()) > steps.most_points * static_cast<double>(beyond.points()) ||
+      !all_step || ns > (every > 1 ? kOfMost : 1) * steps.most)
     worst.clear();
   return worst;
 }

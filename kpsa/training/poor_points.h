@@ -38,9 +38,10 @@ class PointsBeyond {
 struct TileSteps {
   std::vector<double> ns = {};  // by tile, what its step costs; 0: it has none; empty: none has
   double most = std::numeric_limits<double>::infinity();  // that all of them may cost
+  double most_points = 1;                                 // of all points
 };
 
-// The points that are beyond in any pose; none where these are not few, one of them has no step, or their steps cost too
+// The points that are beyond in any pose; none where these are too many, one of them has no step, or their steps cost too
 // much. Of the tiles of `steps`, these are one of `every`; then they may cost less, since among the others there are more.
 std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps& steps,
                                     std::size_t every = 1);

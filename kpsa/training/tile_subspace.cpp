@@ -214,8 +214,8 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
            ShareBeyond(errors, kOfWhole * options.tolerance, but) <= promise.most_of_whole;
   };
   const bool many = candidates.size() > kTrialTiles * kTrialTiles;
-  const bool may_be_poor = promise.steps.ns.empty() && !promise.strict;
-  bool promising = may_be_poor;
+  // Of few tiles none was tried, so that they are; of many some were, and but for poor ones they may be promising
+  bool promising = !many && !promise.strict && promise.steps.ns.empty(), but_poor = !many && !promise.strict;
   if (many) {
     if (trial->errors.size() == 0) {
       std::vector<TileCandidates> some;
@@ -225,13 +225,16 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
     }
     const Eigen::MatrixXf& errors = trial->errors;
     promising = keeps(errors) && ExpectedBeyond(errors, half, kTrialTiles) <= kMostBeyondHalf;
-    if (!promising && may_be_poor) {
+    if (!promising && !promise.strict) {
       std::vector<std::size_t> worst = WorstFirst(errors, half);
       worst.resize((worst.size() + kMayBePoor / 2) / kMayBePoor);
-      promising = keeps(errors, worst) &&
-                  ExpectedBeyond(errors, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
+      but_poor = keeps(errors, worst) &&
+                 ExpectedBeyond(errors, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
     }
-    if (!promising && PoorPoints(trial->beyond, promise.steps, kTrialTiles).empty()) return {};
+    if (!promising && PoorPoints(trial->beyond, promise.steps, kTrialTiles).empty()) {
+      if (!but_poor) return {};
+      promising = true;
+    }
   }
   if (!trial->chosen) *choice = ChooseTiles(mean, poses, candidates, options);
   trial->chosen = true;
@@ -240,7 +243,7 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
   const Eigen::MatrixXf errors = TileErrors(poses, *choice, {}, &beyond);
   if (!many && keeps(errors)) return {true, {}};
   PromisingTiles found{false, PoorPoints(beyond, promise.steps)};
-  found.promising = !many && !promise.strict && found.poor.empty();
+  found.promising = but_poor && found.poor.empty();
   return found;
 }
 

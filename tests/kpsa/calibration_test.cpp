@@ -118,7 +118,7 @@ TEST(Calibration, IsTheLargestThresholdThatABruteForceSearchFinds) {
         const double cap = std::max_element(pairs.begin(), pairs.end(),
                                             [](const auto& a, const auto& b) { return a.score < b.score; })
                                ->score /
-                           0.7;
+                           0.7;  // some are wrong, so no farther
         const double right = MostlyRight(pairs, tolerance);
         double best = -1;
         constexpr int kSteps = 4000;
@@ -138,6 +138,25 @@ TEST(Calibration, IsTheLargestThresholdThatABruteForceSearchFinds) {
     }
   }
   EXPECT_GT(found, 12) << "most of these can be met";
+}
+
+// Beyond the largest score that was seen, where all errors that were seen leave a margin: they grow with its square at most.
+TEST(Calibration, ReachesBeyondWhatWasSeenWhereAllOfThatIsRight) {
+  std::vector<CalibrationPair> pairs(450);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    pairs[i].score = static_cast<double>(i) / 449, pairs[i].error = 0.25 * pairs[i].score;
+  const auto tau = [&](double tolerance) { return Calibrate(pairs, tolerance, 0.03, 0.5).threshold.tau; };
+  EXPECT_NEAR(tau(0.25), 2, 1e-9) << "the worst is just right: as far as was seen";
+  EXPECT_NEAR(tau(0.36), 2 * 1.2, 1e-9);
+  EXPECT_NEAR(tau(25), 2 * kMostBeyondSeen, 1e-9);
+  pairs[7].error = 0.36;
+  EXPECT_NEAR(tau(0.36), 2, 1e-9) << "whichever pose has it";
+  pairs[7].guard = 1;
+  EXPECT_NEAR(tau(0.36), 2 * 1.2, 1e-9) << "a pose that is evaluated fully says nothing";
+  pairs[7].error = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NEAR(tau(0.36), 2 * 1.2, 1e-9);
+  pairs[7].guard = 0;
+  EXPECT_LE(tau(0.36), 2);
 }
 
 // A promise is about the training at hand: not on the average over trainings, but in nine of ten.

@@ -68,7 +68,8 @@ TEST(PoorPoints, AreNoneWhereTheyAreMany) {
   Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(9, 1);
   errors.topRows(3).setConstant(2);
   beyond.Set(0, errors, 1, 1, 0);
-  const TileSteps steps{{1.0}};
+  TileSteps steps{{1.0}};
+  steps.most_points = 1.0 / 3;
   EXPECT_EQ(PoorPoints(beyond, steps).size(), 3u);
   errors.topRows(4).setConstant(2);
   beyond.Set(0, errors, 1, 1, 0);
