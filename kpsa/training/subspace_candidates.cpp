@@ -28,8 +28,8 @@ constexpr double kClearly = 0.5;        // of the expected cost of the others: c
 constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
-// Of a tile about points that go through a step: more than elsewhere moves these
-constexpr std::size_t kMostCuesOfStepped = 160, kMostPointsOfStepped = 20;
+// Of the poses: another training is for what so many have farther off than half the tolerance
+constexpr double kManyBeyond = 0.02;
 constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 
 }  // namespace
@@ -322,6 +322,11 @@ Status SubspaceCandidates::FindCandidatesOfTiles() {
       FindTileCandidates(setup->rig, &setup->compiler, setup->trained_clips, of);
   if (!candidates.ok()) return candidates.status();
   tile_candidates_ = std::move(*candidates);
+  std::size_t tile = 0;
+  for (const SubspaceOutput& output : setup->Outputs()) {
+    for (std::size_t t = 0; kTilePoints * t < output.reconstructed(); ++t)
+      tile_candidates_[tile++].before_step = output.HoldsInner(t);
+  }
   if (!poses->learnt.empty()) {
     Result<std::vector<TileCandidates>> learning =
         FindTileCandidates(setup->rig, &setup->compiler, setup->clips, of);
@@ -350,7 +355,6 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
     if (!setup->recorder->signals()[s].matrix) add(first[s]);
   }
   if (by_tiles_alone()) {  // all have been tried
-    choice.most_cues = kMostCuesOfStepped, choice.most_points = kMostPointsOfStepped;
     tiles = kpsa::engine::ChooseTiles(modes->pca.mean, poses->poses, tile_candidates_, choice);
     if (may_find_more) poor = FindMorePoor();
     return poor.empty();
@@ -373,7 +377,7 @@ std::vector<std::size_t> SubspaceCandidates::FindMorePoor() {
     std::erase_if(rows, [&](std::size_t row) { return !setup->PointThatComesOut(row); });
     return rows;
   };
-  if (as_they_come_out(beyond.Worst(kFewBeyond)).empty()) return {};
+  if (as_they_come_out(beyond.Worst(kManyBeyond)).empty()) return {};
   return as_they_come_out(beyond.Worst(0));
 }
 

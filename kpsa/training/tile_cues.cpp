@@ -22,6 +22,8 @@
 namespace kpsa::engine {
 namespace {
 
+// Of a tile: scalars, and points; more moves points that go through a step, and what these lie among
+constexpr std::size_t kMostCues = 100, kMostPoints = 12, kMostCuesBeforeStep = 160, kMostPointsBeforeStep = 20;
 constexpr double kFirstRidge = 1e-7;  // of the mean variance of what is measured
 constexpr double kMapRidge[] = {1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4};
 constexpr std::size_t kMapValidated = 8;     // every so manieth pose says which of them
@@ -299,7 +301,11 @@ class TileChooser {
                  least = kCueGain * std::max(total - told, seen * seen * static_cast<double>(y_.size() / 3));
     const std::vector<Eigen::Index> found = GreedyColumns(
         gram, cross,
-        {.total = total, .left = 0, .most = options_.most_cues, .least_variance = 1e-7, .least_gain = least});
+        {.total = total,
+         .left = 0,
+         .most = tile_.before_step ? kMostCuesBeforeStep : kMostCues,
+         .least_variance = 1e-7,
+         .least_gain = least});
     for (const Eigen::Index i : found) {
       chosen_.push_back(scalars[static_cast<std::size_t>(kept[static_cast<std::size_t>(i)])]);
       has_values_ |= chosen_.back().index < poses_.layout().relative_begin;
@@ -344,7 +350,8 @@ class TileChooser {
     const double total = r.squaredNorm();
     std::vector<std::size_t> taken;
     const auto points = tile_.points.size();
-    while (taken.size() < options_.most_points) {
+    const std::size_t most_points = tile_.before_step ? kMostPointsBeforeStep : kMostPoints;
+    while (taken.size() < most_points) {
       std::size_t best = points;
       double most = kPointGain * total;
       for (std::size_t i = 0; i < points; ++i) {

@@ -22,6 +22,7 @@ struct TileCandidates {
   std::vector<Index> joints;                 // that move it: scalar of the first entry of the relative matrix
   std::vector<CueRef> points;                // those of the tile, and near it
   std::size_t own_points = 0;                // the first ones are the tile's
+  bool before_step = false;                  // it gives what a last step reads, too
 };
 
 struct TileCueOptions {
@@ -30,7 +31,6 @@ struct TileCueOptions {
   std::size_t clip_poses = 0;             // the first poses are of clips
   std::vector<CueRef> values;             // that may move any tile: weights of morph targets, envelopes
   double turn_reach = 0;  // scene units that an entry of a rotation, or a value, moves points, about
-  std::size_t most_cues = 100, most_points = 12;  // of a tile: scalars, and points
 };
 
 // The chosen ones, none twice, and which of them each tile reads.
