@@ -16,7 +16,7 @@ constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // Of what a frame is expected to cost otherwise: what steps of some tiles may cost, since tiles have their cost besides
 constexpr double kMostInSteps = 0.5;
 // Of the points: so few may be to blame that the others are worth their time; fewer, where cues for all points are expected
-// to cost less than that, of a full frame
+// to cost less than that, of a full frame, or nobody knows
 constexpr double kMostPoor = 1.0 / 3, kMostPoorOfCheap = 0.05, kCheapPoints = 0.2;
 
 // What was asked for.
@@ -116,6 +116,17 @@ TileSteps StepsOfTiles(const TrainingSetup& setup, const std::vector<Compiler::S
   return tiles;
 }
 
+// It ends with points that are to blame, before anything else was looked for: others are taken that cost less than what is
+// cheap.
+Trained EndedEarly(const TrainingSetup& setup, std::span<const std::size_t> poor) {
+  Trained trained;
+  trained.ended = true, trained.poor = WithStepped(setup, poor);
+  trained.held = setup.sampler->held();
+  trained.ns = kCheapPoints * setup.full_cost / (kOfExpected * kAlikeOfMany);
+  trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
+  return trained;
+}
+
 }  // namespace
 
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
@@ -162,12 +173,22 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     return Status();
   };
 
+  // Another training has to fit
+  const auto has_time_for_more = [&] {
+    return ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed();
+  };
+  const auto may_end_with_points = [&] { return has_time_for_more() && ends->steps != nullptr; };
+
   // Tiles alone
   std::optional<Subspace> made;
   if (candidates.MayBeginWithTiles()) {
     KPSA_RETURN_IF_ERROR(FindModes(setup, poses, true, &modes, &record));
+    if (may_end_with_points())
+      candidates.steps = StepsOfTiles(setup, *ends->steps, kCheapPoints * setup.full_cost);
     Result<std::optional<Subspace>> of_tiles = candidates.OfTilesAlone();
     if (!of_tiles.ok()) return of_tiles.status();
+    if (!candidates.poor.empty()) return EndedEarly(setup, candidates.poor);
+    candidates.steps = {};
     made = std::move(*of_tiles);
     candidates.modes_seconds = setup.limit.elapsed() - before_modes;
     if (made) KPSA_RETURN_IF_ERROR(calibrate(&*made));

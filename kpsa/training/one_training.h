@@ -13,6 +13,9 @@
 
 namespace kpsa::engine {
 
+// Of what a training that ended is expected to cost, which knows its cues and some of its tiles: what it comes to, about
+inline constexpr double kOfExpected = 1.3;
+
 struct Trained {
   Subspace subspace;
   TrainingRecord record;

@@ -122,7 +122,9 @@ Result<std::optional<Subspace>> SubspaceCandidates::OfTilesAlone() {
     Result<PricedTiles> priced = PriceTiles();
     if (!priced.ok()) return priced.status();
     priced_tiles_ = std::move(*priced);
+    FindPoor(priced_tiles_->cost);
   }
+  if (!poor.empty()) return std::optional<Subspace>();
   began_with_tiles_ = priced_tiles_ && priced_tiles_->cost.misses < kManyMisses;
   if (!began_with_tiles_) {
     LeaveTilesAlone();
@@ -163,6 +165,13 @@ Result<PricedTiles> SubspaceCandidates::PriceTiles() {
   return priced;
 }
 
+void SubspaceCandidates::FindPoor(const FrameCost& of_tiles) {
+  if (steps.ns.empty() || of_tiles.misses <= kManyMisses || !std::isfinite(of_tiles.ns)) return;
+  PointsBeyond beyond;
+  TileErrors(poses->poses, tiles, fits_, &beyond);
+  poor = PoorPoints(beyond, steps);
+}
+
 // Of one with cues for all points, and of those with cues of each tile, the cheaper one.
 Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.8));
@@ -183,12 +192,8 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   record->tried.insert(record->tried.end(), priced.tried.begin(), priced.tried.end());
   std::size_t best = first + priced.best;
   fine = priced.fine;
-  if (!steps.ns.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
-    PointsBeyond beyond;
-    TileErrors(poses->poses, tiles, fits_, &beyond);
-    poor = PoorPoints(beyond, steps);
-    if (!poor.empty()) return false;
-  }
+  FindPoor(of_tiles);
+  if (!poor.empty()) return false;
   // As chosen, without products of tiles: others with these would hardly do better, and take their time
   by_tile = by_tiles_alone() || (of_tiles.misses < kManyMisses && of_tiles.ns < kClearly * cues.choice.cost);
   if (by_tiles_alone() && !std::isfinite(of_tiles.ns)) return false;

@@ -76,7 +76,7 @@ struct SubspaceCandidates {
 
   // With many tiles those with cues of their own are made first, of few modes: where few judges miss, what all points would
   // measure could hardly be so much cheaper that it would be taken, and is not looked for. None where many miss; then what
-  // tiles alone were trained on is set aside.
+  // tiles alone were trained on is set aside. None, and `poor`, where some points alone are to blame.
   bool MayBeginWithTiles() const;
   Result<std::optional<Subspace>> OfTilesAlone();
   void LeaveTilesAlone();  // also where calibration says that they do not serve
@@ -116,6 +116,7 @@ struct SubspaceCandidates {
   Status FindCandidatesOfTiles();
   std::vector<std::size_t> FindMorePoor();
   Result<PricedTiles> PriceTiles();
+  void FindPoor(const FrameCost& of_tiles);  // where many miss
 
   std::vector<TileCandidates> tile_candidates_ = {}, learning_tiles_ = {};
   std::size_t modes_poses_ = 0;           // of the poses, those that modes are found of

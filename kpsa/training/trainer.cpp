@@ -23,8 +23,6 @@ constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
 // and of that, what it costs then
 constexpr double kDearFollowing = 0.5, kCheaperAtRest = 0.75;
 constexpr const char* kNotLeft = "no second training that leaves controls at rest which this one gets wrong";
-// Of what a training that ended is expected to cost, which knows its cues and some of its tiles: what it comes to, about
-constexpr double kOfExpected = 1.3;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some points, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
