@@ -15,9 +15,9 @@ namespace {
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // Of what a frame is expected to cost otherwise: what steps of some tiles may cost, since tiles have their cost besides
 constexpr double kMostInSteps = 0.5;
-// Of the points: so few may be to blame that the others are worth their time; fewer, where cues for all points are expected
-// to cost less than that, of a full frame, or nobody knows
-constexpr double kMostPoor = 1.0 / 3, kMostPoorOfCheap = 0.05, kCheapPoints = 0.2;
+// Of the points: fewer may be to blame where cues for all points are expected to cost less than that, of a full frame, or
+// nobody knows
+constexpr double kMostPoorOfCheap = 0.05, kCheapPoints = 0.2;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {

@@ -11,6 +11,8 @@ namespace kpsa::engine {
 
 // Of the poses: so few of them hardly matter.
 inline constexpr double kFewBeyond = 0.005;
+// Of the points: so few may be to blame that the others are worth their time
+inline constexpr double kMostPoor = 1.0 / 3;
 
 // In which poses which points are farther off than some bound. Point k of tile t is number kTilePoints t + k.
 class PointsBeyond {

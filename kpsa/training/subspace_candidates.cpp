@@ -30,6 +30,8 @@ constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tri
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
 // Of the poses: another training is for what so many have farther off than half the tolerance
 constexpr double kManyBeyond = 0.02;
+// Likewise of those that are drawn as clips are: clips are farther off than these, and few of the judges say so
+constexpr double kManyNear = 0.25;
 constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 
 }  // namespace
@@ -166,9 +168,11 @@ Result<PricedTiles> SubspaceCandidates::PriceTiles() {
 }
 
 void SubspaceCandidates::FindPoor(const FrameCost& of_tiles) {
-  if (steps.ns.empty() || of_tiles.misses <= kManyMisses || !std::isfinite(of_tiles.ns)) return;
+  const bool near = of_tiles.near > kManyNear;
+  if (steps.ns.empty() || (of_tiles.misses <= kManyMisses && !near) || !std::isfinite(of_tiles.ns)) return;
   PointsBeyond beyond;
   TileErrors(poses->poses, tiles, fits_, &beyond);
+  if (near) steps.most_points = kMostPoor;
   poor = PoorPoints(beyond, steps);
 }
 
@@ -407,9 +411,16 @@ Result<FrameCost> SubspaceCandidates::Price(Subspace* subspace, const CueSet& of
     judged.push_back({pose, 0, poses->judge_kinds[judged.size()]});
   subspace->tolerance = setup->options.tolerance;
   subspace->violation_rate = setup->options.violation_rate;
-  return ChooseMisses(subspace, judged, *points + setup->CostOfSteps(), setup->full_cost,
-                      kCautious * setup->options.tolerance, kEvenOdds)
-      .cost;
+  FrameCost cost = ChooseMisses(subspace, judged, *points + setup->CostOfSteps(), setup->full_cost,
+                                kCautious * setup->options.tolerance, kEvenOdds)
+                       .cost;
+  std::size_t sampled = 0, near = 0;
+  for (const ScoreJudge& judge : judged) {
+    if (judge.kind != static_cast<int>(PoseKind::kSampled)) continue;
+    ++sampled, near += judge.pose.error > setup->options.tolerance / 2;
+  }
+  cost.near = static_cast<double>(near) / static_cast<double>(std::max<std::size_t>(sampled, 1));
+  return cost;
 }
 
 }  // namespace kpsa::engine

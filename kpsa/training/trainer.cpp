@@ -154,6 +154,15 @@ double CostOfClips(const Trained& trained) {
   return trained.ns + (*trained.lost_of_clips - trained.lost) * trained.full_ns;
 }
 
+// Of what another training costs, or is expected to: this is taken at less. The steps of all points cost half of that by
+// themselves; with many tiles cues of these are taken at more.
+double AlikeOf(const Trained& stepped, const TrainOptions& options) {
+  return stepped.subspace.tile_count() < options.many_tiles ? kCheaperInner : kAlikeOfMany;
+}
+double AlikeOfExpected(const Trained& stepped, const TrainOptions& options) {
+  return kOfExpected * AlikeOf(stepped, options);
+}
+
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
@@ -181,7 +190,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     Result<Trained> stepped = TrainStepped(**split, AllAbout(chosen->poor, **split, **of_some), clips, rest);
     if (!stepped.ok() && stepped.status().kind() == ErrorKind::kInterrupted) return stepped;
     if (stepped.ok() && stepped->ns < kWorthStepping * stepped->full_ns &&
-        stepped->ns < kCheaperInner * chosen->ns) {
+        stepped->ns < AlikeOfExpected(*stepped, options) * chosen->ns) {
       AddTried(*chosen, &*stepped);
       return stepped;
     }
@@ -211,9 +220,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     Result<Trained> made = TrainStepped(**split, whole->poor, clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
-      // The steps of all points cost half of that by themselves. With many tiles cues of these are taken at more
-      const double alike = (whole->ended ? kOfExpected : 1) *
-                           (made->subspace.tile_count() < options.many_tiles ? kCheaperInner : kAlikeOfMany);
+      const double alike = whole->ended ? AlikeOfExpected(*made, options) : AlikeOf(*made, options);
       if (made->ns < enough && CostOfClips(*made) < alike * of_whole) {
         AddTried(*whole, &*made);
         return made;

@@ -195,8 +195,8 @@ std::string NameOf(const ::testing::TestParamInfo<Stepped>& of) {
   const char* const names[] = {"AllPoints", "SomeTiles", "SomePoints"};
   return names[static_cast<int>(of.param)];
 }
-INSTANTIATE_TEST_SUITE_P(Of, InnerPoints,
-                         ::testing::Values(Stepped::kAll, Stepped::kTiles, Stepped::kPoints), NameOf);
+INSTANTIATE_TEST_SUITE_P(Of, InnerPoints, ::testing::Values(Stepped::kAll, Stepped::kTiles, Stepped::kPoints),
+                         NameOf);
 
 // Of some smooth poses, those that hit: more than five, within a tolerance and a half.
 void ExpectHitsNear(const HelloFolder& folder, const std::shared_ptr<const Subspace>& trained,
@@ -311,6 +311,18 @@ TEST(InnerPointsOfRigs, AreOfThePointsThatNeedThem) {
   EXPECT_GT(stepped[0], stepped[1]);
   EXPECT_GT(stepped[1], 0u);
   EXPECT_GT(stepped[2], stepped[1]) << "and those between them";
+
+  // With many tiles before anything is found for all points, where few are poor
+  TrainOptions options = InnerTraining(TrainOptions::Inner::kIfCheaper);
+  options.tolerance = 2e-3, options.many_tiles = 1;
+  const auto first = TrainRig(folder.rig(), options);
+  ASSERT_NE(first, nullptr);
+  EXPECT_GT(first->outputs[0].stepped.points.size(), 0u);
+  const std::vector<TrainingRecord::Tried> tried = ParseTraining(first->training).tried;
+  ASSERT_FALSE(tried.empty());
+  for (const TrainingRecord::Tried& one : tried)
+    EXPECT_TRUE(one.what.ends_with(kBeforeLastStepOfSome)) << one.what;
+  ExpectHitsNear(folder, first, options.tolerance);
 }
 
 }  // namespace
