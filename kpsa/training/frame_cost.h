@@ -43,8 +43,7 @@ struct FrameCost {
   double ns = 0;      // of a frame; a wrong one counts as so many that miss
   // What those lose by misses, of a full evaluation, that are made as the clips are; none: there are no such judges
   std::optional<double> lost_of_clips = {};
-  double near =
-      0;  // share of the sampled ones that are farther off than half the tolerance, whatever they are judged
+  double near = 0;  // share of the sampled ones that are off by more than half the tolerance
   double lost() const { return misses + kWrongCost * wrong; }
   static constexpr double kWrongCost = 0.5;
 };

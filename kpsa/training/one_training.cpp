@@ -18,6 +18,9 @@ constexpr double kMostInSteps = 0.5;
 // Of the points: fewer may be to blame where cues for all points are expected to cost less than that, of a full frame, or
 // nobody knows
 constexpr double kMostPoorOfCheap = 0.05, kCheapPoints = 0.2;
+// Of the time so far, that is left where a training ends for another one: after cues for all points, and after a trial of
+// tiles
+constexpr double kToEnd = 2, kToEndEarly = 4;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -174,16 +177,15 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   };
 
   // Another training has to fit
-  const auto has_time_for_more = [&] {
-    return ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed();
+  const auto may_end = [&](double times) {
+    return ends != nullptr && setup.limit.left() > times * setup.limit.elapsed();
   };
-  const auto may_end_with_points = [&] { return has_time_for_more() && ends->steps != nullptr; };
 
   // Tiles alone
   std::optional<Subspace> made;
   if (candidates.MayBeginWithTiles()) {
     KPSA_RETURN_IF_ERROR(FindModes(setup, poses, true, &modes, &record));
-    if (may_end_with_points())
+    if (may_end(kToEndEarly) && ends->steps != nullptr)
       candidates.steps = StepsOfTiles(setup, *ends->steps, kCheapPoints * setup.full_cost);
     Result<std::optional<Subspace>> of_tiles = candidates.OfTilesAlone();
     if (!of_tiles.ok()) return of_tiles.status();
@@ -204,8 +206,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     if (!candidates.by_tiles_alone())  // else nobody asks what all points would measure
       KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
     const CueChoice& choice = candidates.cues.choice;
-    // Another training has to fit
-    const bool has_time = ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed();
+    const bool has_time = may_end(kToEnd);
     candidates.may_find_more = has_time && candidates.by_tiles_alone();
     if (has_time && ends->steps != nullptr) candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
     candidates.dear =

@@ -229,7 +229,9 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     }
     rest.seconds = limit.left();
   }
-  Result<Trained> inner = TrainOnce(**split, clips, rest);
+  // Steps of all points alone may cost more than what they have to be cheaper than
+  Result<Trained> inner = whole->ended && steps > of_whole ? Status::Invalid("their steps are dear")
+                                                           : TrainOnce(**split, clips, rest);
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
   // The cheaper one of the two that reconstruct inner points
