@@ -119,9 +119,9 @@ double MostlyRightUpTo(std::vector<ToldPose> poses, double largest) {
 }
 
 // How much farther than what was seen the score may go, where all that was seen is right: what scores speak of makes
-// errors that grow no faster than its square (kpsa/calibration.h).
+// errors that grow no faster than its square (kpsa/calibration.h). Where there are none, nothing is known of that.
 double ReachBeyond(double worst_error, double tolerance) {
-  return std::clamp(std::sqrt(tolerance / worst_error), 1.0, kMostBeyondSeen);
+  return worst_error > 0 ? std::clamp(std::sqrt(tolerance / worst_error), 1.0, kMostBeyondSeen) : 1;
 }
 
 // The largest tau that all demands allow, or 0.
