@@ -23,7 +23,8 @@ namespace kpsa::engine {
 namespace {
 
 // Of a tile: scalars, and points; more moves points that go through a step, and what these lie among
-constexpr std::size_t kMostCues = 100, kMostPoints = 12, kMostCuesBeforeStep = 160, kMostPointsBeforeStep = 20;
+constexpr std::size_t kMostCues = 100, kMostPoints = 12, kMostCuesBeforeStep = 160,
+                      kMostPointsBeforeStep = 20;
 constexpr double kFirstRidge = 1e-7;  // of the mean variance of what is measured
 constexpr double kMapRidge[] = {1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4};
 constexpr std::size_t kMapValidated = 8;     // every so manieth pose says which of them
@@ -299,13 +300,13 @@ class TileChooser {
     const double total = y_.squaredNorm(), told = ToldByRidge(all, y_, gram, cross, kFirstRidge);
     const double seen = kSeen * options_.tolerance,
                  least = kCueGain * std::max(total - told, seen * seen * static_cast<double>(y_.size() / 3));
-    const std::vector<Eigen::Index> found = GreedyColumns(
-        gram, cross,
-        {.total = total,
-         .left = 0,
-         .most = tile_.before_step ? kMostCuesBeforeStep : kMostCues,
-         .least_variance = 1e-7,
-         .least_gain = least});
+    const std::vector<Eigen::Index> found =
+        GreedyColumns(gram, cross,
+                      {.total = total,
+                       .left = 0,
+                       .most = tile_.before_step ? kMostCuesBeforeStep : kMostCues,
+                       .least_variance = 1e-7,
+                       .least_gain = least});
     for (const Eigen::Index i : found) {
       chosen_.push_back(scalars[static_cast<std::size_t>(kept[static_cast<std::size_t>(i)])]);
       has_values_ |= chosen_.back().index < poses_.layout().relative_begin;
