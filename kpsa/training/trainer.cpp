@@ -154,13 +154,10 @@ double CostOfClips(const Trained& trained) {
   return trained.ns + (*trained.lost_of_clips - trained.lost) * trained.full_ns;
 }
 
-// Of what another training costs, or is expected to: this is taken at less. The steps of all points cost half of that by
-// themselves; with many tiles cues of these are taken at more.
-double AlikeOf(const Trained& stepped, const TrainOptions& options) {
-  return stepped.subspace.tile_count() < options.many_tiles ? kCheaperInner : kAlikeOfMany;
-}
+// Of what a training that ended is expected to cost: one with a step of some points is taken at less. The steps of all
+// points cost half of that by themselves; with many tiles cues of these are taken at more.
 double AlikeOfExpected(const Trained& stepped, const TrainOptions& options) {
-  return kOfExpected * AlikeOf(stepped, options);
+  return kOfExpected * (stepped.subspace.tile_count() < options.many_tiles ? kCheaperInner : kAlikeOfMany);
 }
 
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
@@ -220,8 +217,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     Result<Trained> made = TrainStepped(**split, whole->poor, clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
-      const double alike = whole->ended ? AlikeOfExpected(*made, options) : AlikeOf(*made, options);
-      if (made->ns < enough && CostOfClips(*made) < alike * of_whole) {
+      if (made->ns < enough && CostOfClips(*made) < AlikeOfExpected(*made, options) * of_whole) {
         AddTried(*whole, &*made);
         return made;
       }
