@@ -43,6 +43,9 @@ struct AccelerationTarget {
 Result<std::vector<Compiler::SplitPoints>> SplitMeshes(const Graph& graph, Compiler* compiler,
                                                        const AccelerationTarget& target);
 
+// The points of a plug in the rest pose. Errors: they cannot be evaluated.
+Result<std::vector<Double3>> RestPoints(const Graph& graph, Compiler* compiler, const PlugRef& points);
+
 struct AccelerateOptions {
   double tolerance = -1;          // metres; below 0: the subspace's own; infinity: pure KPSA
   double violation_rate = -1;     // below 0: the subspace's own

@@ -404,16 +404,13 @@ Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTa
                     AccelerationDraft* draft) {
   const std::size_t tiles = draft->data.subspace->patches.tiles;
   if (tiles == 0 || draft->data.always_miss) return Status();
-  std::vector<std::vector<Double3>> positions;
-  for (const AccelerationTarget::MeshPoints& mesh : target.meshes) {
-    const Result<Value> rest = compiler->Rest(graph, mesh.stages.back().points);
+  std::vector<PlacedOutput> placed;
+  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+    Result<std::vector<Double3>> rest = RestPoints(graph, compiler, target.meshes[m].stages.back().points);
     if (!rest.ok()) return rest.status();
-    const ConstPointsView points = rest->points()->view();
-    std::vector<Double3>& of = positions.emplace_back();
-    of.reserve(points.count);
-    for (std::size_t i = 0; i < points.count; ++i) of.push_back({points.x[i], points.y[i], points.z[i]});
+    placed.push_back({std::move(*rest), draft->data.subspace->outputs[m].stepped.starts});
   }
-  draft->data.patches = MakePatches(positions, tiles);
+  draft->data.patches = MakePatches(placed, tiles);
   return Status();
 }
 
@@ -466,6 +463,16 @@ Result<std::vector<Compiler::SplitPoints>> SplitMeshes(const Graph& graph, Compi
     split.back() = std::move(*one);
   }
   return split;
+}
+
+Result<std::vector<Double3>> RestPoints(const Graph& graph, Compiler* compiler, const PlugRef& points) {
+  const Result<Value> rest = compiler->Rest(graph, points);
+  if (!rest.ok()) return rest.status();
+  const ConstPointsView view = rest->points()->view();
+  std::vector<Double3> places;
+  places.reserve(view.count);
+  for (std::size_t i = 0; i < view.count; ++i) places.push_back({view.x[i], view.y[i], view.z[i]});
+  return places;
 }
 
 Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compiler,

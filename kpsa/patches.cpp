@@ -7,6 +7,7 @@
 
 #include "base/median.h"
 #include "kpsa/point_blocks.h"
+#include "kpsa/stepped_points.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa::engine {
@@ -16,15 +17,15 @@ constexpr double kBorder = 3;              // typical distances of neighbours
 constexpr std::size_t kFewestOfLevel = 3;  // regions; fewer would be most of an output each
 
 constexpr std::size_t kBlocksOfTile = kTilePoints / PointBlocks::kSize;
-static_assert(kTilePoints % PointBlocks::kSize == 0, "a block is of one tile");
+static_assert(kTilePoints % PointBlocks::kSize == 0 && SteppedPoints::kStartsAt % PointBlocks::kSize == 0,
+              "a block is of one tile");
 
-// The median distance of points to the nearest other one of the same tile.
-double TypicalDistance(const PointBlocks& blocks, std::size_t tile) {
-  const std::size_t first = tile * kBlocksOfTile, count = std::min(kBlocksOfTile, blocks.size() - first);
-  std::vector<std::uint32_t> all(count);
+// The median distance of points of some blocks to the nearest other one of these.
+double TypicalDistance(const PointBlocks& blocks, std::size_t first, std::size_t end) {
+  std::vector<std::uint32_t> all(end - first);
   std::iota(all.begin(), all.end(), static_cast<std::uint32_t>(first));
   std::vector<double> nearest;  // squared
-  for (std::size_t block = first; block < first + count; ++block) {
+  for (std::size_t block = first; block < end; ++block) {
     PointBlocks::Distances least;
     least.fill(PointBox::kFar);
     blocks.NearestApart(all, block, &least);
@@ -119,21 +120,26 @@ PatchLayout MakePatchLayout(std::span<const std::size_t> tiles_of_outputs) {
   return layout;
 }
 
-std::vector<PatchPoints> MakePatches(std::span<const std::vector<Double3>> positions,
-                                     std::size_t tiles_of_patch) {
+std::vector<PatchPoints> MakePatches(std::span<const PlacedOutput> outputs, std::size_t tiles_of_patch) {
   std::vector<PatchPoints> patches;
-  for (std::size_t m = 0; m < positions.size(); ++m) {
-    PointBlocks blocks(positions[m]);
-    PatchMaker maker(&blocks, positions[m].size());
-    const std::size_t tiles = (positions[m].size() + kTilePoints - 1) / kTilePoints;
+  for (std::size_t m = 0; m < outputs.size(); ++m) {
+    const std::span<const Index> starts = outputs[m].starts;
+    const std::size_t points = outputs[m].positions.size();
+    PointBlocks blocks(outputs[m].positions);
+    PatchMaker maker(&blocks, points);
+    const std::size_t tiles = starts.empty() ? (points + kTilePoints - 1) / kTilePoints : starts.size();
+    const auto first_of = [&](std::size_t tile) {
+      return tile >= tiles    ? blocks.size()
+             : starts.empty() ? tile * kBlocksOfTile
+                              : starts[tile] / PointBlocks::kSize;
+    };
     for (std::size_t tile = 0; tile < tiles; tile += tiles_of_patch) {
+      const std::size_t end = std::min(tile + tiles_of_patch, tiles);
       double border = 0;
-      for (std::size_t t = tile; t < std::min(tile + tiles_of_patch, tiles); ++t)
-        border = std::max(border, kBorder * TypicalDistance(blocks, t));
-      const std::size_t first = tile * kBlocksOfTile;
+      for (std::size_t t = tile; t < end; ++t)
+        border = std::max(border, kBorder * TypicalDistance(blocks, first_of(t), first_of(t + 1)));
       patches.emplace_back().output = static_cast<Index>(m);
-      maker.Make(first, std::min(tiles_of_patch * kBlocksOfTile, blocks.size() - first), border,
-                 &patches.back());
+      maker.Make(first_of(tile), first_of(end) - first_of(tile), border, &patches.back());
     }
   }
   return patches;

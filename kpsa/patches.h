@@ -64,9 +64,13 @@ struct PatchPoints {
   std::vector<Index> points;
   std::vector<float> weights;
 };
-// positions: of the points of each output, at rest or on the average. Those that are not finite lie nowhere.
-std::vector<PatchPoints> MakePatches(std::span<const std::vector<Double3>> positions,
-                                     std::size_t tiles_of_patch);
+// The points of an output, at rest; those that are not finite lie nowhere. starts: of each tile, its first point, a
+// multiple of PointBlocks::kSize (SteppedPoints::starts); empty: tiles have kTilePoints each.
+struct PlacedOutput {
+  std::vector<Double3> positions;
+  std::span<const Index> starts = {};
+};
+std::vector<PatchPoints> MakePatches(std::span<const PlacedOutput> outputs, std::size_t tiles_of_patch);
 
 // The points of any patch of a region.
 std::vector<Index> PointsOfRegion(const PatchRegion& region, std::span<const PatchPoints> patches);

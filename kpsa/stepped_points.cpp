@@ -18,7 +18,7 @@ bool SteppedPoints::Fit(std::size_t points_of_mesh) const {
   if (starts.empty()) return points.empty() || !WholeTiles(points, points_of_mesh).empty();
   for (std::size_t t = 0; t < starts.size(); ++t) {
     const Range of = PointsOf(t, points_of_mesh);
-    if (of.begin % kStartsAt != 0 || of.end - of.begin > kTilePoints) return false;
+    if (of.begin % kStartsAt != 0 || of.end <= of.begin || of.end - of.begin > kTilePoints) return false;
   }
   return starts[0] == 0;
 }

@@ -157,8 +157,9 @@ Status ValidateSubspace(const Subspace& s) {
       return Status::Invalid("output \"{}\" is not at the stage \"{}\"", output.name, output.stage);
   }
   for (std::size_t i = 0; i < s.outputs.size(); ++i) {
-    if (s.outputs[i].inner > 0 &&
-        (s.outputs[i].inner < s.outputs[i].points || s.components != 3 || s.patches.tiles > 0)) {
+    // What a patch holds comes out of its own tiles
+    const bool apart = s.patches.tiles == 0 || !s.outputs[i].stepped.starts.empty();
+    if (s.outputs[i].inner > 0 && (s.outputs[i].inner < s.outputs[i].points || s.components != 3 || !apart)) {
       return Status::Invalid("output \"{}\" has {} points, and {} inner ones of {} components in {} patches",
                              s.outputs[i].name, s.outputs[i].points, s.outputs[i].inner, s.components,
                              s.patches.tiles);

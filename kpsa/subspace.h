@@ -31,9 +31,9 @@ namespace kpsa::engine {
 // of activity, 15 where patches miss by themselves in blends only. 3: without products of latents, world matrices as
 // cues, and doubts; 4: without products as cues; 5: without patches; 6: without guards of patches; 7: without calibration
 // poses near clips; 8: cues, ranges and the trained rig are JSON, and not tensors; 9: without inner points
-inline constexpr int kSubspaceVersion = 16, kSteppedPointsVersion = 16, kBlendsVersion = 15,
-                     kActivityVersion = 14, kHeldVersion = 13, kPartialVersion = 12, kMendsVersion = 11,
-                     kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
+inline constexpr int kSubspaceVersion = 17, kSteppedPatchesVersion = 17, kSteppedPointsVersion = 16,
+                     kBlendsVersion = 15, kActivityVersion = 14, kHeldVersion = 13, kPartialVersion = 12,
+                     kMendsVersion = 11, kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 

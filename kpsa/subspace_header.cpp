@@ -181,14 +181,16 @@ int VersionOf(const Subspace& s) {
   const bool held = std::ranges::any_of(s.calibration, [](const CalibrationPair& pair) {
     return pair.kind == static_cast<int>(PoseKind::kHeld);
   });
-  return std::ranges::any_of(s.outputs, of_points) ? kSteppedPointsVersion
-         : s.patches.blends_only                   ? kBlendsVersion
-         : std::isfinite(s.activity_limit)         ? kActivityVersion
-         : held                                    ? kHeldVersion
-         : partial                                 ? kPartialVersion
-         : !s.mends.empty()                        ? kMendsVersion
-         : s.of_inner()                            ? kInnerVersion
-                                                   : kListsVersion;
+  const bool stepped = std::ranges::any_of(s.outputs, of_points);
+  return stepped && s.patches.tiles > 0    ? kSteppedPatchesVersion
+         : stepped                         ? kSteppedPointsVersion
+         : s.patches.blends_only           ? kBlendsVersion
+         : std::isfinite(s.activity_limit) ? kActivityVersion
+         : held                            ? kHeldVersion
+         : partial                         ? kPartialVersion
+         : !s.mends.empty()                ? kMendsVersion
+         : s.of_inner()                    ? kInnerVersion
+                                           : kListsVersion;
 }
 
 }  // namespace

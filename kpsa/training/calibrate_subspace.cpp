@@ -106,7 +106,6 @@ Status GuardPatches(const Calibrator& of, const CalibrationWork& work, Subspace*
 struct Guarded {
   Subspace subspace;
   ChosenMisses chosen;  // nothing where there are no judges
-  double outside = 0;   // CostOutside
 };
 // judged: poses within the ranges; those beyond come from here. outside: of FoundMargins.
 Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const RangeMargins& margins,
@@ -119,7 +118,7 @@ Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const R
       finder.Make(of.rig, work.compiler, of.guards,
                   {of.options.tolerance, of.options.range_ramp, of.diagonal, of.inverse_rest_stretch, rest});
   if (!ranges.ok()) return ranges.status();
-  Guarded result{subspace, {}, 0};
+  Guarded result{subspace, {}};
   result.subspace.ranges = std::move(*ranges);
   for (std::size_t e = 0; e < guarded.size(); ++e) {
     if (!guarded[e]) result.subspace.ranges[e].reach = 0;
@@ -128,13 +127,10 @@ Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const R
   if (judged.judges.empty()) return result;
   KPSA_RETURN_IF_ERROR(JudgePoses(of, work, kBeyond, kScoreSeed, margins.of_controls, judge, &judged));
   AskGuards(result.subspace.ranges, guarded, judged.entries, result.subspace.patches.patches, &judged.judges);
-  const double tolerance = kCautious * of.options.tolerance;
-  result.chosen =
-      ChooseMisses(&result.subspace, judged.judges, 0, of.full_cost, tolerance, kCalibrationConfidence);
-  AskGuards(result.subspace.ranges, guarded, outside.entries, subspace.patches.patches, &outside.judges);
-  for (JudgedSet* set : {&judged, &outside}) AsChosen(result.chosen, result.subspace, &set->judges);
-  result.outside = CostOutside(result.subspace, judged.judges, outside.judges, of.full_cost, tolerance,
-                               kCalibrationConfidence);
+  AskGuards(result.subspace.ranges, guarded, outside.entries, result.subspace.patches.patches,
+            &outside.judges);
+  result.chosen = ChooseMisses(&result.subspace, judged.judges, 0, of.full_cost,
+                               kCautious * of.options.tolerance, kCalibrationConfidence, outside.judges);
   return result;
 }
 
@@ -231,7 +227,7 @@ std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
 
 // Of margins that were taken all that was tried, of others the best.
 std::vector<TrainingRecord::Rule> TriedRules(const ChosenMisses& chosen, const RangeMargins& margins,
-                                             double outside, double full, bool all) {
+                                             double full, bool all) {
   std::vector<TrainingRecord::Rule> rules;
   if (!(full > 0)) return rules;  // the paper's way: nothing was priced
   for (std::size_t r = 0; r < chosen.tried.size(); ++r) {
@@ -239,7 +235,7 @@ std::vector<TrainingRecord::Rule> TriedRules(const ChosenMisses& chosen, const R
     if (rule.weighs && rule.score.doubt == 0 && r != chosen.taken)
       continue;  // weighs nothing: the same again
     if (all || r == chosen.taken)
-      rules.push_back({RuleName(rule, margins), rule.cost.misses, (rule.cost.ns + outside) / full,
+      rules.push_back({RuleName(rule, margins), rule.cost.misses, rule.cost.with_outside() / full,
                        all && r == chosen.taken});
   }
   return rules;
@@ -320,7 +316,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     if (some.told_by_doubts && tried[taken].subspace.score.doubt == 0) continue;
     Result<Guarded> one = Guard(of, work, some, guarded, *rest, *subspace, &score_judge, scoring, outside);
     if (!one.ok()) return one.status();
-    const double ns = one->chosen.cost.ns + one->outside;
+    const double ns = one->chosen.cost.with_outside();
     tried.push_back(std::move(*one));
     if (tried.size() > 1 && ns > kAsGood * least) continue;
     taken = tried.size() - 1;
@@ -328,7 +324,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   }
   std::vector<ExpectedOfMargins> expected;
   for (const Guarded& one : tried) {
-    const double ns = one.chosen.cost.ns + one.outside;
+    const double ns = one.chosen.cost.with_outside();
     expected.push_back({one.chosen.cost.misses, of.full_cost > 0 ? ns / of.full_cost : 0});
   }
   std::vector<Calibrated> calibrated(tried.size());
@@ -353,7 +349,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   for (const bool as_taken : {false, true}) {
     for (std::size_t i = 0; i < tried.size(); ++i) {
       if ((i == of_best) != as_taken) continue;
-      const auto told = TriedRules(tried[i].chosen, margins[i], tried[i].outside, of.full_cost, as_taken);
+      const auto told = TriedRules(tried[i].chosen, margins[i], of.full_cost, as_taken);
       rules.insert(rules.end(), told.begin(), told.end());
     }
   }

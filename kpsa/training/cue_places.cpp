@@ -195,23 +195,27 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
   return kept->cost;
 }
 
-Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
-                                 std::span<const Double3> points) {
+Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals) {
   std::vector<std::size_t> tiles;
-  std::vector<std::vector<Double3>> positions;
+  std::vector<PlacedOutput> placed;
   std::vector<RequestedOutput> outputs;
   for (std::size_t m = 0; m < totals.size(); ++m) {
-    tiles.push_back((totals[m] + kTilePoints - 1) / kTilePoints);
-    positions.emplace_back(points.begin(), points.begin() + totals[m]);
-    points = points.subspan(rig.rows(m, totals[m]));
-    outputs.push_back({rig.target.meshes[m].stages.back().points, {}});
+    const std::span<const Index> starts =
+        rig.stepped.empty() ? std::span<const Index>() : std::span(rig.stepped[m].starts);
+    if (rig.step(m) != nullptr && starts.empty()) return PatchLayout();  // tiles are of other points
+    const PlugRef plug = rig.target.meshes[m].stages.back().points;
+    Result<std::vector<Double3>> rest = RestPoints(*rig.graph, compiler, plug);
+    if (!rest.ok()) return rest.status();
+    tiles.push_back(starts.empty() ? (totals[m] + kTilePoints - 1) / kTilePoints : starts.size());
+    placed.push_back({std::move(*rest), starts});
+    outputs.push_back({plug, {}});
   }
   PatchLayout layout = MakePatchLayout(tiles);
   if (layout.tiles == 0) return layout;
   const Result<Kept> full = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!full.ok()) return full.status();
   if (!(full->cost > 0)) return PatchLayout();
-  const std::vector<PatchPoints> patches = MakePatches(positions, layout.tiles);
+  const std::vector<PatchPoints> patches = MakePatches(placed, layout.tiles);
   for (const PatchRegion& region : layout.regions) {
     const PlugRef plug = rig.target.meshes[region.output].stages.back().points;
     const PointSet of = PointSet::Of(PointsOfRegion(region, patches), totals[region.output]);

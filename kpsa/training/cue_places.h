@@ -36,8 +36,7 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
 
 // Patches that could miss by themselves, whatever the cues, and what each region of them costs of the full
 // evaluation: with the points that deformers ask for about it, and since what it reads was seldom read
-// lately. positions: of the points of all outputs, on the average. tiles 0 where nothing would be local.
-Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
-                                 std::span<const Double3> positions);
+// lately. tiles 0 where nothing would be local, or what a tile holds comes out elsewhere.
+Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals);
 
 }  // namespace kpsa::engine

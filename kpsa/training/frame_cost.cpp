@@ -167,9 +167,14 @@ namespace {
 
 // With doubts as they are.
 FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> judges, double points,
-                              double full, double tolerance, double confidence, ChosenMisses* chosen) {
+                              double full, double tolerance, double confidence,
+                              std::span<const ScoreJudge> outside, ChosenMisses* chosen) {
   const auto cost = [&](std::span<const ScoreJudge> of) {
-    return ExpectedCost(*subspace, of, points, full, tolerance, confidence);
+    FrameCost expected = ExpectedCost(*subspace, of, points, full, tolerance, confidence);
+    std::vector<ScoreJudge> beyond(outside.begin(), outside.end());
+    JudgeBy(subspace->patches, &beyond);
+    expected.outside = CostOutside(*subspace, of, beyond, full, tolerance, confidence);
+    return expected;
   };
   PatchLayout patches = std::exchange(subspace->patches, {});
   std::vector<ScoreJudge> whole(judges.begin(), judges.end());
@@ -182,7 +187,7 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
   chosen->taken = 0;
   if (patches.tiles == 0) return least;
   PatchLayout taken;
-  const double whole_ns = least.ns, whole_misses = least.misses;
+  const double whole_ns = least.with_outside(), whole_misses = least.misses;
   const auto take = [&](const FrameCost& with) { least = with, taken = subspace->patches; };
   subspace->patches = patches;
   // In blends alone, where parts are cheap: a clip goes there where no judge has been, so what costs judges no more
@@ -193,7 +198,7 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
     JudgeBy(subspace->patches, &in_blends);
     const FrameCost with = cost(in_blends);
     chosen->tried.push_back({of_all, patches.tiles, true, weighs, with});
-    if (ArePartial(patches) && with.ns <= kNoWorse * whole_ns) take(with), chosen->taken = 1;
+    if (ArePartial(patches) && with.with_outside() <= kNoWorse * whole_ns) take(with), chosen->taken = 1;
     subspace->patches.blends_only = false;
   }
   // SoftCache's own score speaks of all points, and would say of no part that it misses. Where it misses next
@@ -209,10 +214,11 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
   for (const double share : kShares) {
     subspace->patches.share = share;
     const FrameCost with = cost(judges);
-    if (with.ns < in_parts.cost.ns) in_parts.cost = with;
+    if (with.with_outside() < in_parts.cost.with_outside()) in_parts.cost = with;
     // Of equal ones, since a clip may go where no judge has been
     if (whole_misses == with.misses && !ArePartial(patches)) continue;
-    if (taken.tiles == 0 ? with.ns <= bar : with.ns < std::min(bar, least.ns))
+    if (taken.tiles == 0 ? with.with_outside() <= bar
+                         : with.with_outside() < std::min(bar, least.with_outside()))
       take(with), chosen->taken = chosen->tried.size();
   }
   if (chosen->taken < chosen->tried.size()) subspace->score = of_all;
@@ -230,18 +236,20 @@ void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<
 }
 
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
-                          double tolerance, double confidence) {
+                          double tolerance, double confidence, std::span<const ScoreJudge> outside) {
   const PatchLayout patches = subspace->patches;
   ChosenMisses as_they_are, believed;
-  as_they_are.cost = ChooseScoreAndParts(subspace, judges, points, full, tolerance, confidence, &as_they_are);
+  as_they_are.cost =
+      ChooseScoreAndParts(subspace, judges, points, full, tolerance, confidence, outside, &as_they_are);
   believed.trust = TrustInTiles(judges);
   if (believed.trust.empty()) return as_they_are;
   const ScoreMix score = std::exchange(subspace->score, {});
   const PatchLayout taken = std::exchange(subspace->patches, patches);
-  std::vector<ScoreJudge> weighed(judges.begin(), judges.end());
-  WeighDoubts(believed.trust, *subspace, weighed);
-  believed.cost = ChooseScoreAndParts(subspace, weighed, points, full, tolerance, confidence, &believed);
-  if (believed.cost.ns < kClearlyLess * as_they_are.cost.ns) {
+  std::vector<ScoreJudge> weighed(judges.begin(), judges.end()), beyond(outside.begin(), outside.end());
+  for (std::vector<ScoreJudge>* of : {&weighed, &beyond}) WeighDoubts(believed.trust, *subspace, *of);
+  believed.cost =
+      ChooseScoreAndParts(subspace, weighed, points, full, tolerance, confidence, beyond, &believed);
+  if (believed.cost.with_outside() < kClearlyLess * as_they_are.cost.with_outside()) {
     believed.tried.insert(believed.tried.end(), as_they_are.tried.begin(), as_they_are.tried.end());
     return believed;
   }

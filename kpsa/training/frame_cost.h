@@ -43,7 +43,9 @@ struct FrameCost {
   double ns = 0;      // of a frame; a wrong one counts as so many that miss
   // What those lose by misses, of a full evaluation, that are made as the clips are; none: there are no such judges
   std::optional<double> lost_of_clips = {};
-  double near = 0;  // share of the sampled ones that are off by more than half the tolerance
+  double near = 0;     // share of the sampled ones that are off by more than half the tolerance
+  double outside = 0;  // CostOutside, which `ns` does not have
+  double with_outside() const { return ns + outside; }
   double lost() const { return misses + kWrongCost * wrong; }
   static constexpr double kWrongCost = 0.5;
 };
@@ -78,9 +80,9 @@ struct ChosenMisses {
 // Judges as that choice has them: doubts weighed, and patches only where these miss by themselves.
 void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<ScoreJudge>* judges);
 // ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches
-// miss by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of
-// WeighTiles.
+// miss by themselves: all as a frame costs least, with those outside. Tiles stay as they are, the score is for those of
+// WeighTiles. outside: as CostOutside has them.
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
-                          double tolerance, double confidence);
+                          double tolerance, double confidence, std::span<const ScoreJudge> outside = {});
 
 }  // namespace kpsa::engine

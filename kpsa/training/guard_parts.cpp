@@ -36,8 +36,7 @@ class NeedFinder {
       for (std::size_t t = 0; t < tiles; ++t) {
         if (t % together == 0) needs.emplace_back();
         PatchNeeds* patch = &needs.back();
-        const auto first = static_cast<Index>(t * kTilePoints);
-        const auto end = static_cast<Index>(std::min(data.points, (t + 1) * kTilePoints));
+        const auto [first, end] = subspace_.outputs[m].stepped.PointsOf(t, subspace_.outputs[m].points);
         std::set<Index>& own = patch->points[{m, rig_.target.meshes[m].stages.size() - 1}];
         for (Index point = first; point < end; ++point) own.insert(point);
         for (std::size_t i = 0; i < data.counts[t]; ++i) AddRow(data.columns[column++], patch);

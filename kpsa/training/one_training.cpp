@@ -156,9 +156,9 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   CentrePoses(setup, &poses, &modes, &record);
   SubspaceCandidates candidates{&setup, &poses, &modes, &record};
   const bool of_points = !setup.of_light() && setup.of_map();
-  if (of_points && !options.without.patches && rig.split.empty() && rig.some.empty()) {
+  if (of_points && !options.without.patches && rig.some.empty()) {
     KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
-    Result<PatchLayout> patches = PricePatches(setup.rig, &setup.compiler, setup.totals, modes.positions);
+    Result<PatchLayout> patches = PricePatches(setup.rig, &setup.compiler, setup.totals);
     if (!patches.ok()) return patches.status();
     candidates.patches = std::move(*patches);
   }

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "graph/evaluator.h"
+#include "kpsa/accelerate.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa::engine {
@@ -33,24 +33,22 @@ std::vector<Index> FarthestApart(std::span<const Double3> places, std::size_t co
 Result<std::optional<TrainingRig>> SomePointsOf(const TrainingRig& rig, std::size_t many, std::size_t some) {
   KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
   Compiler compiler;
-  Request request;
-  for (const auto& mesh : rig.target.meshes) request.outputs.push_back({mesh.stages.back().points, {}});
-  const Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*rig.graph, request);
-  if (!plan.ok()) return plan.status();
+  std::vector<std::vector<Double3>> rest;
   std::size_t all = 0;
-  for (const Plan::Output& output : (*plan)->outputs()) all += output.points.total();
+  for (const auto& mesh : rig.target.meshes) {
+    Result<std::vector<Double3>> of = RestPoints(*rig.graph, &compiler, mesh.stages.back().points);
+    if (!of.ok()) return of.status();
+    all += of->size();
+    rest.push_back(std::move(*of));
+  }
   if (all <= many) return std::optional<TrainingRig>();
-  Evaluator evaluator(*plan);
-  KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
   TrainingRig of_some = rig;
   while (of_some.every < kLeastOfPoints && all > some * of_some.every) of_some.every *= 2;
-  for (std::size_t m = 0; m < rig.target.meshes.size(); ++m) {
-    const ConstPointsView rest = evaluator.Points(static_cast<Index>(m));
+  for (const std::vector<Double3>& of : rest) {
     std::vector<Index>& points = of_some.some.emplace_back();
-    for (std::size_t first = 0; first < rest.count; first += kTilePoints) {
-      std::vector<Double3> places;
-      for (std::size_t i = first; i < std::min(first + kTilePoints, rest.count); ++i)
-        places.push_back({rest.x[i], rest.y[i], rest.z[i]});
+    for (std::size_t first = 0; first < of.size(); first += kTilePoints) {
+      const std::span<const Double3> places =
+          std::span(of).subspan(first, std::min(kTilePoints, of.size() - first));
       for (const Index i : FarthestApart(places, (places.size() + of_some.every - 1) / of_some.every))
         points.push_back(static_cast<Index>(first) + i);
     }

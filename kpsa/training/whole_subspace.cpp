@@ -152,7 +152,7 @@ Result<Subspace> WholeSubspace::Make(const RangeFinder& ranges, CalibrationSize 
   candidates_.Describe(&subspace);
   if (!setup_.options.without.patches) {
     KPSA_RETURN_IF_ERROR(setup_.rig.set_clip(std::nullopt));
-    Result<PatchLayout> patches = PricePatches(setup_.rig, &setup_.compiler, setup_.totals, positions_);
+    Result<PatchLayout> patches = PricePatches(setup_.rig, &setup_.compiler, setup_.totals);
     if (!patches.ok()) return patches.status();
     candidates_.patches = std::move(*patches);
   }
@@ -227,10 +227,6 @@ Status WholeSubspace::MakeTiles(Subspace* subspace) {
       KPSA_RETURN_IF_ERROR(setup_.Say("all points", 0.96));
     }
     made.subspace.tiles.push_back(builder.Finish(mean, inputs));
-    for (std::size_t p = 0; p < points; ++p) {
-      const auto at = static_cast<Eigen::Index>(3 * p);
-      positions_.push_back({mean[at], mean[at + 1], mean[at + 2]});
-    }
     first_some += (some.rig.rows(m, setup_.totals[m]) + kTilePoints - 1) / kTilePoints;
   }
   if (some_.by_tile) FinishTiles(&made);

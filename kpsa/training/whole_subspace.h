@@ -26,7 +26,6 @@ class WholeSubspace {
   const SubspaceCandidates& some_;
   TrainingSetup setup_;
   SubspaceCandidates candidates_;
-  std::vector<Double3> positions_;  // mean, of all points
 };
 
 }  // namespace kpsa::engine

@@ -122,7 +122,7 @@ TEST_F(BadSubspaces, Headers) {
     value = "99";
   }
   ASSERT_TRUE(found) << newer["__metadata__"].dump();
-  ExpectBad(WithHeader(newer.dump()), {"version 99, this program reads versions 3 to 16"});
+  ExpectBad(WithHeader(newer.dump()), {"version 99, this program reads versions 3 to 17"});
   for (const auto& [key, value] : header["__metadata__"].items()) {
     json other = header;
     other["__metadata__"].erase(key);

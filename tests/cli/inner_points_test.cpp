@@ -191,6 +191,67 @@ TEST_P(InnerPoints, OfOtherPointsAreRefused) {
   EXPECT_NE(run.error.find("train it again"), std::string::npos) << run.error;
 }
 
+// A value outside its range costs the patches that it speaks of: their tiles come out of the full evaluation, and what the
+// step reads about the points of another tile stands in that tile.
+TEST_P(InnerPoints, MissInPartsWhereTilesHoldWhatTheirStepsRead) {
+  if (trained_->doubt_inputs() == 0) GTEST_SKIP() << "no tile has products";
+  auto guarded = std::make_shared<Subspace>(*WithGuardsOnly(*trained_));
+  guarded->score = {0, 1 / kQuickTolerance};
+  guarded->patches = MakePatchLayout(guarded->tiles_of_outputs());
+  ASSERT_GT(guarded->patches.tiles, 0u);
+  for (const PatchRegion& region : guarded->patches.regions)
+    guarded->patches.costs.push_back(0.02 * region.count);
+  TrainedRange& range =
+      *std::ranges::max_element(guarded->ranges, {}, [](const TrainedRange& one) { return one.hi - one.lo; });
+  range.hi = range.lo + 0.4 * (range.hi - range.lo), range.ramp = (range.hi - range.lo) / 20;
+  constexpr std::size_t kPatch = 2;
+  for (TrainedRange& one : guarded->ranges) one.patches = std::uint64_t{1} << kPatch;
+  if (GetParam() != Stepped::kPoints) {
+    EXPECT_FALSE(ValidateSubspace(*guarded).ok()) << "points come out of what other tiles hold";
+    return;
+  }
+  const std::string path = *folder_ / "parts.kpsa";
+  ASSERT_TRUE(WriteSubspace(*guarded, path).ok()) << ValidateSubspace(*guarded).ToString();
+  EXPECT_NE(folder_->Read(path).find(fmt::format("\"version\":\"{}\"", kSteppedPatchesVersion)),
+            std::string::npos);
+  const Result<Subspace> read = ReadSubspace(path);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->patches, guarded->patches);
+  RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = std::make_shared<const Subspace>(*read)}),
+      pure(folder_->rig(), {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  ASSERT_TRUE(run.ok()) << run.error;
+  const PatchPoints& patch = run.accelerated.config->data().patches[kPatch];
+  const SubspaceOutput& output = trained_->outputs[0];
+  const std::size_t tiles = guarded->patches.tiles;
+  const Index first = output.stepped.PointsOf(kPatch * tiles, output.points).begin,
+              end = output.stepped.PointsOf((kPatch + 1) * tiles - 1, output.points).end;
+  EXPECT_NE(first % kTilePoints, 0u) << "tiles have fewer points";
+  std::size_t hits = 0, misses = 0;
+  for (const auto& pose : SmoothPoses(run.rig, 60, 0.9)) {
+    for (RigRun* of : {&full, &run, &pure}) of->Pose(pose);
+    const RunFrame exact = full.Evaluate(), frame = run.Evaluate(), reconstructed = pure.Evaluate();
+    hits += frame.hit;
+    EXPECT_EQ(frame.hit, SameBytes(frame.points, reconstructed.points));
+    if (frame.hit || frame.full_weight < 1 / static_cast<double>(guarded->patches.patches) - 1e-6) continue;
+    EXPECT_EQ(frame.reason, MissReason::kOutOfRange);
+    if (frame.full_weight > 1.5 / static_cast<double>(guarded->patches.patches)) continue;  // all guards ask
+    ++misses;
+    for (std::size_t i = 0; i < output.points; ++i) {
+      const bool reached = std::ranges::binary_search(patch.points, static_cast<Index>(i));
+      for (std::size_t a = 0; a < 3; ++a) {
+        const std::size_t at = a * output.points + i;
+        if (!reached) {
+          ASSERT_EQ(frame.points[at], reconstructed.points[at]) << i;
+        } else if (i >= first && i < end) {
+          ASSERT_EQ(frame.points[at], exact.points[at]) << i;
+        }
+      }
+    }
+  }
+  EXPECT_GT(hits, 5u);
+  EXPECT_GT(misses, 3u);
+}
+
 std::string NameOf(const ::testing::TestParamInfo<Stepped>& of) {
   const char* const names[] = {"AllPoints", "SomeTiles", "SomePoints"};
   return names[static_cast<int>(of.param)];

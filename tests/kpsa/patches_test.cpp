@@ -71,7 +71,7 @@ TEST(Patches, GoOverIntoTheRestWithinThreeDistances) {
   std::vector<Double3> grid = Grid();
   const double nan = std::nan("");
   grid[1000] = {nan, 0, 0};
-  const std::vector<PatchPoints> patches = MakePatches(std::vector<std::vector<Double3>>{grid}, 2);
+  const std::vector<PatchPoints> patches = MakePatches(std::vector<PlacedOutput>{{grid}}, 2);
   ASSERT_EQ(patches.size(), 4u);
   for (std::size_t p = 0; p < patches.size(); ++p) {
     std::vector<double> weights(1024, 0.0);
@@ -122,15 +122,24 @@ TEST(Patches, AreThoseOfANaiveTwin) {
       if (round == 50) points[i] = {1, 2, 3};
       if (round == 51) points[i].z = std::nan("");
     }
-    const std::size_t tiles = 1 + random() % 3, size = tiles * kTilePoints;
+    const std::size_t tiles = 1 + random() % 3;
     const std::span<const Double3> of(points);
-    const std::vector<PatchPoints> patches = MakePatches(std::vector<std::vector<Double3>>{points}, tiles);
-    ASSERT_EQ(patches.size(), (points.size() + size - 1) / size);
+    // Of as many points as there are, or of fewer where there have to be inner points
+    std::vector<Index> starts;
+    for (std::size_t start = 0; start < points.size();) {
+      starts.push_back(static_cast<Index>(start));
+      start += round % 2 == 0 ? kTilePoints : SteppedPoints::kStartsAt * (1 + random() % 8);
+    }
+    const std::span<const Index> given = round % 2 == 0 ? std::span<const Index>() : starts;
+    const std::vector<PatchPoints> patches = MakePatches(std::vector<PlacedOutput>{{points, given}}, tiles);
+    ASSERT_EQ(patches.size(), (starts.size() + tiles - 1) / tiles);
+    starts.push_back(static_cast<Index>(points.size()));
     for (std::size_t p = 0; p < patches.size(); ++p) {
-      const std::size_t first = p * size, end = std::min(first + size, points.size());
+      const std::size_t last = std::min(starts.size() - 1, (p + 1) * tiles);
+      const std::size_t first = starts[p * tiles], end = starts[last];
       double border = 0;
-      for (std::size_t t = first; t < end; t += kTilePoints)
-        border = std::max(border, 3 * NaiveTypicalDistance(of.subspan(t, std::min(kTilePoints, end - t))));
+      for (std::size_t t = p * tiles; t < last; ++t)
+        border = std::max(border, 3 * NaiveTypicalDistance(of.subspan(starts[t], starts[t + 1] - starts[t])));
       PatchPoints expected;
       for (std::size_t i = 0; i < points.size(); ++i) {
         double least = border * border;

@@ -454,7 +454,7 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_EQ(message(header), "no error");
   EXPECT_NE(edited([](Json* j) {
               (*j)["__metadata__"]["version"] = "1";
-            }).find("format version 1, this program reads versions 3 to 16; train it again"),
+            }).find("format version 1, this program reads versions 3 to 17; train it again"),
             std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
             std::string::npos);
