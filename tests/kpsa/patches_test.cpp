@@ -509,6 +509,35 @@ std::vector<ScoreJudge> OneWrongPatch(std::size_t wrong_every, double told) {
   return judges;
 }
 
+// Frames beyond the ranges, where guards ask for one patch, cost what that costs.
+TEST(Patches, AreTakenForFramesBeyondTheRanges) {
+  const std::vector<ScoreJudge> judges = OneWrongPatch(5, 0.3);
+  std::vector<ScoreJudge> outside = OneWrongPatch(100000, 1);
+  for (ScoreJudge& judge : outside) judge.guards_of_patches.assign(12, 0), judge.guards_of_patches[2] = 1;
+  const auto choose = [&](double cost, std::span<const ScoreJudge> beyond) {
+    Subspace subspace;
+    subspace.violation_rate = 0.03;
+    subspace.tolerance = 1e-3;
+    subspace.patches = MakePatchLayout(std::vector<std::size_t>{12});
+    subspace.patches.costs.assign(subspace.patches.regions.size(), cost);
+    const ChosenMisses chosen = ChooseMisses(&subspace, judges, 0, 1e5, 1e-3, 0.9, beyond);
+    EXPECT_EQ(chosen.cost.outside > 0, !beyond.empty());
+    return std::pair(subspace.patches.tiles > 0 && !subspace.patches.blends_only, chosen.cost.outside);
+  };
+  const auto [parts, of_parts] = choose(0.1, outside);
+  const auto [whole, of_whole] = choose(0.95, outside);
+  EXPECT_TRUE(parts);
+  EXPECT_FALSE(whole);
+  EXPECT_NEAR(of_parts, 0.1 * of_whole, 1e-6 * of_whole);
+  int taken = 0, taken_for_these = 0;
+  for (int percent = 10; percent < 95; percent += 3) {
+    taken += choose(0.01 * percent, {}).first;
+    taken_for_these += choose(0.01 * percent, outside).first;
+  }
+  EXPECT_GT(taken, 0);
+  EXPECT_GT(taken_for_these, taken);
+}
+
 TEST(Patches, AreTakenWhereTheySpareTime) {
   const auto choose = [](const std::vector<ScoreJudge>& judges, double cost) {
     Subspace subspace;
