@@ -131,6 +131,8 @@ void WriteSubspaces(const std::string& folder) {
   s.calibration = {{0.5, 1e-4, 0, 0}};
   s.calibration[0].patches.assign(s.patches.patches, {0.1, 1e-4});
   Check(WriteSubspace(s, folder + "/patches.kpsa"));
+  before_last_step.patches = s.patches, before_last_step.calibration = s.calibration;
+  Check(WriteSubspace(before_last_step, folder + "/parts.kpsa"));
   s.patches.blends_only = true;
   s.calibration[0].middle = s.calibration[0].score;
   Check(WriteSubspace(s, folder + "/blends.kpsa"));
