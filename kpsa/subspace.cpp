@@ -27,7 +27,8 @@ Status CheckProduct(const CueDescription& cue, std::size_t k, std::size_t height
 
 Status CheckPatches(const Subspace& s) {
   const PatchLayout& patches = s.patches;
-  if (patches.tiles == 0 && patches.costs.empty()) return {};
+  if (patches.tiles == 0 && patches.costs.empty())
+    return patches.blends_only ? Status::Invalid("patches miss in blends, but there are none") : Status();
   const PatchLayout made = MakePatchLayout(s.tiles_of_outputs());
   if (patches.tiles != made.tiles || patches.regions != made.regions ||
       patches.costs.size() != made.regions.size())
