@@ -28,7 +28,8 @@ namespace kpsa::engine {
 
 // What a file may be of; 9 is what is written, or 10 where inner points are reconstructed, 11 where points are mended,
 // 12 where inner points are of some tiles, 13 where calibration poses hold controls over clips, 14 where there is a limit
-// of activity, 15 where patches miss by themselves in blends only. 3: without products of latents, world matrices as
+// of activity, 15 where patches miss by themselves in blends only, 16 where a last step is of single points, 17 where patches
+// miss there. 3: without products of latents, world matrices as
 // cues, and doubts; 4: without products as cues; 5: without patches; 6: without guards of patches; 7: without calibration
 // poses near clips; 8: cues, ranges and the trained rig are JSON, and not tensors; 9: without inner points
 inline constexpr int kSubspaceVersion = 17, kSteppedPatchesVersion = 17, kSteppedPointsVersion = 16,

@@ -141,6 +141,8 @@ TEST(SteppedPoints, ThatDoNotFitAreToldApart) {
   EXPECT_FALSE((SteppedPoints{{3}, {0, 111, 239, 367, 495, 623}}).Fit(kRowPoints))
       << "not where a block begins";
   EXPECT_FALSE((SteppedPoints{{3}, {16, 112, 240, 368, 496, 624}}).Fit(kRowPoints));
+  EXPECT_TRUE((SteppedPoints{{3}, {0, 128}}).Fit(129));
+  EXPECT_FALSE((SteppedPoints{{3}, {0, 128}}).Fit(128)) << "a tile without points";
   EXPECT_FALSE((SteppedPoints{{}, {0, 112, 240, 368, 496, 624}}).Fit(kRowPoints));
   // What the step reads about them has to have room
   std::vector<Index> starts;
