@@ -13,7 +13,7 @@ using scenes::Ellipsoid;
 using scenes::SmoothUnion;
 
 // Groups of motions.
-enum : std::size_t { kTrunk, kArmL, kArmR, kHandL, kHandR, kLegL, kLegR, kTravelling, kGroups };
+enum : std::size_t { kTrunk, kArmL, kArmR, kHandL, kHandR, kLegL, kLegR, kTravelling, kGroupsOfBody };
 
 struct Proportions {
   double height, legs, hips, shoulders, arm, girth, head, finger, slope;
@@ -49,7 +49,7 @@ class Body {
   explicit Body(std::uint64_t seed) : random_(seed ^ 0xb0d7), p_(DrawProportions(random_)) {
     design_.weight_falloff = Count(random_, 3, 6);
     design_.weight_rounds = Count(random_, 3, 8);
-    design_.groups.resize(kGroups);
+    design_.groups.resize(kGroupsOfBody);
     design_.groups[kHandL].coherence = design_.groups[kHandR].coherence = 0.6;
     for (const std::size_t g : {kHandL, kHandR, kArmL, kArmR}) design_.groups[g].lag = 0.3;
   }

@@ -16,10 +16,10 @@ using scenes::SmoothUnion;
 constexpr std::size_t kArms = 8, kJoints = 10;
 // Groups of motions: how each arm bends, how it sways, then how all arms twist, and the mantle.
 constexpr std::size_t kBend = 0, kSway = kArms, kTwist = 2 * kArms, kMantle = kTwist + 1,
-                      kGroups = kMantle + 1;
+                      kGroupsOfCreature = kMantle + 1;
 
 std::vector<double> Shares(double bend, double sway, double twist, double mantle) {
-  std::vector<double> shares(kGroups, bend);
+  std::vector<double> shares(kGroupsOfCreature, bend);
   std::fill_n(shares.begin() + kSway, kArms, sway);
   shares[kTwist] = twist, shares[kMantle] = mantle;
   return shares;
@@ -32,7 +32,7 @@ Design DesignCreature(std::uint64_t seed) {
   Design design;
   design.weight_falloff = Count(random, 3, 6);
   design.weight_rounds = Count(random, 2, 6);
-  design.groups.resize(kGroups);
+  design.groups.resize(kGroupsOfCreature);
   for (std::size_t arm = 0; arm < kArms; ++arm) {
     design.groups[kBend + arm] = {0.6, Between(random, 0.3, 0.8)};
     design.groups[kSway + arm] = {0.6, Between(random, 0.3, 0.8)};

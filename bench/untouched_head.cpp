@@ -14,7 +14,7 @@ using scenes::SmoothCut;
 using scenes::SmoothUnion;
 
 // Groups of motions.
-enum : std::size_t { kNeck, kEyes, kJaw, kFaceJoints, kUpper, kMiddle, kLower, kGroups };
+enum : std::size_t { kNeck, kEyes, kJaw, kFaceJoints, kUpper, kMiddle, kLower, kGroupsOfHead };
 
 // Where shapes are on the left half: across, up and forward, in radii of the skull.
 struct Region {
@@ -63,7 +63,7 @@ class Head {
   explicit Head(std::uint64_t seed) : random_(seed ^ 0x4ead), f_(DrawFace(random_)) {
     design_.weight_falloff = Count(random_, 3, 5);
     design_.weight_rounds = Count(random_, 10, 25);
-    design_.groups.resize(kGroups);
+    design_.groups.resize(kGroupsOfHead);
     design_.groups[kEyes].coherence = 0.9;
     design_.groups[kNeck].coherence = 0.3;
   }
