@@ -30,6 +30,12 @@ Result<BoundKernel> BindSculpt(const Binding& binding) {
                    0);
 }
 
+// The cube root; of a handle's determinant that is all but 1 by its series, as exact, in a tenth of the time.
+double CubeRoot(double value) {
+  const double beyond = value - 1;
+  return std::fabs(beyond) < 1e-5 ? 1 + beyond * (1.0 / 3 - beyond * (1.0 / 9)) : std::cbrt(value);
+}
+
 void ComputeSculpt(SculptContext c) {
   const auto& bound = c.kernel_as<SculptBound>();
   const double radius = c.get<"radius">();
@@ -41,10 +47,11 @@ void ComputeSculpt(SculptContext c) {
                               radius,
                               c.get<"envelope">()};
   // Lengths are world ones: the mean radius of the sphere as its handle scales it
-  const double size = radius * std::cbrt(std::fabs(Determinant3(handle)));
+  const double size = radius * CubeRoot(std::fabs(Determinant3(handle)));
   if (size > 0) {
-    inputs.shape.dropoff_distance = c.get<"dropoffDistance">() / size;
-    inputs.shape.max_displacement = c.get<"maximumDisplacement">() / size;
+    const double per_size = 1 / size;
+    inputs.shape.dropoff_distance = c.get<"dropoffDistance">() * per_size;
+    inputs.shape.max_displacement = c.get<"maximumDisplacement">() * per_size;
   }
   Matrix4 sphere_from_world;
   if (bound.mode == SculptMode::kStretch && Invert(handle, &sphere_from_world)) {

@@ -16,6 +16,11 @@ constexpr std::size_t kGrain = 2048;
 
 float Float(double value) { return static_cast<float>(value); }
 
+// fmod(half_turns, 2), which takes a third of a step: most angles are within a turn.
+double WithinATurn(double half_turns) {
+  return std::fabs(half_turns) < 2 ? half_turns : std::fmod(half_turns, 2.0);
+}
+
 AlongRun MakeAlong(double low, double high) {
   const float from = Float(low), to = Float(high);
   const bool wide = to - from > kLeastWidth;
@@ -23,7 +28,7 @@ AlongRun MakeAlong(double low, double high) {
 }
 
 RippleRun MakeRipple(double amplitude, double wavelength, double offset, double dropoff) {
-  return {Float(2 / wavelength), Float(-std::fmod(2 * offset / wavelength, 2.0)),
+  return {Float(2 / wavelength), Float(-WithinATurn(2 * offset / wavelength)),
           Float(dropoff >= 0 ? amplitude : amplitude * (1 + dropoff)), Float(-amplitude * dropoff)};
 }
 bool Ripples(double amplitude, double wavelength) {
@@ -39,7 +44,7 @@ bool Prepare(const Bend& b, NonLinearRun* run) {
 }
 
 bool Prepare(const Twist& t, NonLinearRun* run) {
-  run->twist = {MakeAlong(t.low, t.high), Float(std::fmod(t.start / kPi, 2.0)),
+  run->twist = {MakeAlong(t.low, t.high), Float(WithinATurn(t.start / kPi)),
                 Float((t.end - t.start) / kPi)};
   return t.start != 0 || t.end != 0;
 }
