@@ -5,6 +5,7 @@
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
+#include "host/finite_points.h"
 #include "host/rig_frames.h"
 #include "host/rig_training.h"
 
@@ -24,8 +25,11 @@ Status Check(const Flags& flags, std::vector<std::string>* notes, std::string* s
   request.varying = VaryingPlugs(rig);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
-  KPSA_RETURN_IF_ERROR(
-      EvaluateTimes(rig, *plan, {0.0}, {}, [](std::size_t, const Evaluator&) { return Status(); }));
+  KPSA_RETURN_IF_ERROR(EvaluateTimes(rig, *plan, {0.0}, {}, [&](std::size_t, const Evaluator& evaluator) {
+    for (std::size_t m = 0; m < rig.scene.meshes.size(); ++m)
+      KPSA_RETURN_IF_ERROR(CheckFinite(rig, rig.scene.meshes[m], evaluator.Points(m), 0));
+    return Status();
+  }));
   std::size_t vertices = 0;
   for (const CharacterMesh& mesh : rig.scene.meshes) vertices += mesh.vertex_count;
   *summary =

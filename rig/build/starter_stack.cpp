@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "rig/build/starter_text.h"
+#include "rig/build/starter_training.h"
 
 namespace kpsa::engine {
 namespace {
@@ -61,7 +62,9 @@ StarterStack WriteStack(const StarterCharacter& in, const std::string& file, int
   text += fmt::format(
       "kpsa: 1\n"
       "units: {{length: cm, angle: deg}}\n"
+      "{}"
       "character: {}\n",
+      in.rig.fps == kUnsaidFps ? "" : fmt::format("fps: {}  # of the clips' keys\n", in.rig.fps),
       Quoted(file, false));
   if (meshes.empty()) {
     stack.remark = "the scene shows no mesh, so that there is nothing to accelerate";

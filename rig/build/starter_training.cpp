@@ -20,8 +20,8 @@ constexpr double kTestMotion = 0.5;       // of the motion of the whole clip
 constexpr std::int64_t kSamplesBase = 300, kSamplesPerControl = 10;
 constexpr std::int64_t kLeastSamples = 400, kMostSamples = 2000, kMostPoses = 4500;
 
-std::int64_t FrameCount(const gltf::Clip& clip) {
-  return static_cast<std::int64_t>(std::min(clip.duration * kStarterFps, 1e6) + 1e-6) + 1;
+std::int64_t FrameCount(const gltf::Clip& clip, double fps) {
+  return static_cast<std::int64_t>(std::min(clip.duration * fps, 1e6) + 1e-6) + 1;
 }
 
 // Tests begin at `offset` eighths of each period.
@@ -49,11 +49,11 @@ struct TestMotion {
   double beyond = 0;  // the farthest pose from the mean of the clip, of the farthest that is trained on
 };
 TestMotion MotionOf(const PointPoses& poses, const std::vector<double>& distance,
-                    const std::vector<ClipPart>& parts) {
+                    const std::vector<ClipPart>& parts, double fps) {
   double squares = 0, weights = 0, test = 0, train = 0;
   for (const ClipPart& part : parts) {
     const auto at = [&](std::int64_t frame) {
-      const double time = (static_cast<double>(frame) - 0.5) / kStarterFps;
+      const double time = (static_cast<double>(frame) - 0.5) / fps;
       return static_cast<std::size_t>(std::lower_bound(poses.times.begin(), poses.times.end(), time) -
                                       poses.times.begin());
     };
@@ -94,7 +94,22 @@ Index ChooseTest(const gltf::Character& character, std::vector<ClipMotion> motio
 
 }  // namespace
 
-std::vector<ClipPart> CutClip(const PointPoses& poses, std::int64_t frames) {
+double FramesOfKeys(const std::vector<gltf::Clip>& clips) {
+  constexpr double kUsual[] = {kUnsaidFps, 25, 30, 48, 50, 60}, kOff = 0.01;  // of a frame
+  const auto fits = [&](double fps) {
+    return std::ranges::all_of(clips, [&](const gltf::Clip& clip) {
+      return std::ranges::all_of(clip.channels, [&](const gltf::Channel& channel) {
+        return std::ranges::all_of(channel.times, [&](double time) {
+          return std::fabs(time * fps - std::round(time * fps)) <= kOff;
+        });
+      });
+    });
+  };
+  const auto* const found = std::ranges::find_if(kUsual, fits);
+  return found == std::end(kUsual) ? kUnsaidFps : *found;
+}
+
+std::vector<ClipPart> CutClip(const PointPoses& poses, std::int64_t frames, double fps) {
   if (frames < kLeastFrames) return {};
   const std::int64_t tests = std::clamp<std::int64_t>((frames + kPeriod / 2) / kPeriod, 1, kMostTests);
   const std::vector<double> distance = poses.DistancesFromMean();
@@ -103,7 +118,7 @@ std::vector<ClipPart> CutClip(const PointPoses& poses, std::int64_t frames) {
   TestMotion found;
   for (const std::int64_t offset : {3, 2, 4}) {
     std::vector<ClipPart> parts = Layout(frames, tests, offset);
-    const TestMotion now = MotionOf(poses, distance, parts);
+    const TestMotion now = MotionOf(poses, distance, parts, fps);
     const bool enough = now.motion >= kTestMotion * motion, had_enough = found.motion >= kTestMotion * motion;
     const bool better = best.empty() || (enough && had_enough ? now.beyond < found.beyond
                                                               : now.motion > found.motion && !had_enough);
@@ -125,7 +140,7 @@ Result<StarterTraining> ChooseTraining(Rig* rig, std::optional<NodeId> space,
   for (Index c = 0; c < clips.size(); ++c) {
     const std::string& id = character.clips[c].id;
     if (character.FindClip(id) != c) continue;  // another one has that name
-    if (const Result<PointPoses> poses = meter.OfClip(id, kStarterFps, most); poses.ok()) {
+    if (const Result<PointPoses> poses = meter.OfClip(id, rig->fps, most); poses.ok()) {
       MeasuredClip& clip = clips[c];
       clip.motion = poses->Motion();
       clip.largest = poses->Largest();
@@ -140,9 +155,9 @@ Result<StarterTraining> ChooseTraining(Rig* rig, std::optional<NodeId> space,
   const Index test = ChooseTest(character, motions, clips, rig->rest_diagonal);
   if (test != kNoIndex) alone = kNoIndex;
   if (alone != kNoIndex) {
-    const Result<PointPoses> poses = meter.OfClip(character.clips[alone].id, kStarterFps, kMostOfCut);
+    const Result<PointPoses> poses = meter.OfClip(character.clips[alone].id, rig->fps, kMostOfCut);
     if (!poses.ok()) return poses.status();
-    choice.parts = CutClip(*poses, FrameCount(character.clips[alone]));
+    choice.parts = CutClip(*poses, FrameCount(character.clips[alone], rig->fps), rig->fps);
     if (!choice.parts.empty()) choice.cut = character.clips[alone].id;
   }
   double squares = 0, weights = 0;
@@ -150,7 +165,8 @@ Result<StarterTraining> ChooseTraining(Rig* rig, std::optional<NodeId> space,
     if (!clips[c].moves) continue;
     const std::string& id = character.clips[c].id;
     if (id != choice.cut) (c == test || c == alone ? choice.test : choice.train).push_back(id);
-    choice.frames += c == test || (c == alone && choice.cut.empty()) ? 0 : FrameCount(character.clips[c]);
+    choice.frames +=
+        c == test || (c == alone && choice.cut.empty()) ? 0 : FrameCount(character.clips[c], rig->fps);
     if (c == test || !clips[c].moves_in_space) continue;
     const double weight = static_cast<double>(clips[c].poses);
     squares += weight * clips[c].motion * clips[c].motion;

@@ -10,7 +10,9 @@
 
 namespace kpsa::engine {
 
-inline constexpr double kStarterFps = 24;  // of a rig that says nothing else
+inline constexpr double kUnsaidFps = 24;  // of a rig that says nothing else
+// Frames a second that all keys of the clips fall onto: kUnsaidFps before others that are usual; it, too, where none fits.
+double FramesOfKeys(const std::vector<gltf::Clip>& clips);
 
 // Frames [first, last] of a clip.
 struct ClipPart {
@@ -20,8 +22,8 @@ struct ClipPart {
 // A clip in parts that alternate, a quarter of it to test on, with gaps in between: neighbouring frames are
 // nearly the same, and would flatter. Of the places where tests may lie, one in which the points move half as
 // much as in the whole clip, and where they go least beyond the rest of it. None of a clip of less than
-// kLeastFrames. `poses` is of the whole clip, evenly spread.
-std::vector<ClipPart> CutClip(const PointPoses& poses, std::int64_t frames);
+// kLeastFrames. `poses` is of the whole clip, evenly spread; `fps` frames a second.
+std::vector<ClipPart> CutClip(const PointPoses& poses, std::int64_t frames, double fps = kUnsaidFps);
 inline constexpr std::int64_t kLeastFrames = 24;
 
 struct StarterTraining {

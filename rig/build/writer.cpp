@@ -6,6 +6,7 @@
 #include "rig/build/starter_acceleration.h"
 #include "rig/build/starter_stack.h"
 #include "rig/build/starter_text.h"
+#include "rig/build/starter_training.h"
 
 namespace kpsa::engine {
 namespace {
@@ -36,6 +37,7 @@ Result<std::string> StarterRig(const NodeRegistry& registry, const std::string& 
   rig_options.rest = true;
   Result<Rig> rig = LoadRig(registry, character_path, rig_options);
   if (!rig.ok()) return rig.status();
+  rig->fps = rig->units.fps = FramesOfKeys(rig->character->clips);
   const std::string file = options.character.empty()
                                ? std::filesystem::path(rig->character->path).filename().string()
                                : options.character;

@@ -8,6 +8,7 @@
 
 #include "files/npz.h"
 #include "gltf/import.h"
+#include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/gltf_reference.h"
@@ -123,6 +124,18 @@ TEST(Caches, OfPointsThatAreNotFiniteAreRefused) {
         << name << run.err;
     EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
   }
+}
+
+// `fine` is said of a first frame that could be written.
+TEST(Caches, ValidateRefusesPointsThatAreNotFinite) {
+  const HelloFolder folder;
+  const std::string rig =
+      folder.Edit("nodes:\n", "nodes:\n  odd: {type: expression, expression: \"sqrt(0 - 1)\"}\n");
+  EXPECT_EQ(RunKpsa({"validate", rig}).exit_code, 0) << "nothing reads it";
+  const std::string bad = folder.Edit("connections:\n", "connections:\n  - odd.output -> upper.translateX\n");
+  const ProcessResult run = RunKpsa({"validate", bad});
+  EXPECT_EQ(run.exit_code, 4) << run.err;
+  EXPECT_NE(run.err.find("not finite after node"), std::string::npos) << run.err;
 }
 
 }  // namespace

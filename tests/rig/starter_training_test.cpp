@@ -54,7 +54,7 @@ PointPoses PosesOf(std::int64_t frames, const F& x) {
   PointPoses poses;
   poses.points = 1;
   for (std::int64_t f = 0; f < frames; ++f) {
-    poses.times.push_back(static_cast<double>(f) / kStarterFps);
+    poses.times.push_back(static_cast<double>(f) / kUnsaidFps);
     poses.rows.insert(poses.rows.end(), {static_cast<float>(x(f)), 0, 0});
   }
   return poses;

@@ -123,6 +123,30 @@ TEST_F(Templates, MakeNodesOfTheirOwnForEachUse) {
   EXPECT_EQ(rig.files.size(), 2u) << "a use is no file";
 }
 
+// Words that name nodes: joints of a chain, what a constraint follows and owns, the driver of poses, curves of a wire.
+TEST_F(Templates, WordsNameNodesOfTheirOwn) {
+  const Rig rig = Loaded(R"yaml(templates:
+  limb:
+    nodes:
+      upper: {type: transform, parent: root, translateX: 1}
+      lower: {type: transform, parent: upper, translateX: 1}
+      foot: {type: transform, parent: lower, translateX: 1}
+      goal: {type: transform, translate: [2, 1, 0]}
+      ik: {type: ikHandle, start: upper, mid: lower, end: foot, target: goal.worldMatrix}
+      held: {type: transform}
+      hold: {type: parentConstraint, targets: [goal, foot], constrained: held}
+      bends: {type: poseInterpolator, driver: lower, poses: {rest: [0, 0, 0], bent: [0, 0, 90]}}
+      one: {type: curve, places: [[0, 0, 0], [1, 0, 0]]}
+      two: {type: curve, places: [[0, 1, 0], [1, 1, 0]]}
+      pull: {type: wire, curves: [one, two], dropoff: 1}
+use: {l: {template: limb}}
+deform: [{meshes: [body], stack: [gltf, "l:pull"]}]
+)yaml");
+  EXPECT_EQ(Driver(rig, "l:hold.targetMatrix[0]"), "l:goal.worldMatrix");
+  EXPECT_EQ(Driver(rig, "l:hold.targetMatrix[1]"), "l:foot.worldMatrix");
+  EXPECT_EQ(Driver(rig, "l:ik.parentMatrix"), "root.worldMatrix");
+}
+
 // The same rig written out gives the same points.
 TEST_F(Templates, EqualWhatIsWrittenOut) {
   Loaded(kArms);

@@ -52,6 +52,31 @@ TEST_F(RigWriterTest, RangesControlsByTheClips) {
   EXPECT_TRUE(rig.notes.empty());
 }
 
+// Clips are trained on and played at the frames that they were keyed at.
+TEST_F(RigWriterTest, FramesASecondAreThoseOfTheKeys) {
+  const auto of_keys = [](std::vector<double> times) {
+    gltf::Clip clip;
+    clip.channels.emplace_back().times = std::move(times);
+    return FramesOfKeys({std::move(clip)});
+  };
+  EXPECT_EQ(FramesOfKeys({}), 24);
+  EXPECT_EQ(of_keys({0, 0.5, 1, 7}), 24) << "of 30, too, but nothing says so";
+  EXPECT_EQ(of_keys({0, 1 / 24.0, 5 / 24.0}), 24);
+  EXPECT_EQ(of_keys({0, 2 / 25.0}), 25);
+  EXPECT_EQ(of_keys({static_cast<double>(1 / 30.0f), static_cast<double>(301 / 30.0f)}), 30);
+  EXPECT_EQ(of_keys({0, 1 / 60.0}), 60);
+  EXPECT_EQ(of_keys({0.0123, 1.77}), 24) << "none";
+  GltfBuilder builder = GltfBuilder::Character();
+  EXPECT_FALSE(Has(Starter(folder.Write("whole.gltf", builder.Text())), "fps"));
+  const int times = builder.Accessor(std::vector<float>{0, 1 / 30.0f, 2}, "SCALAR");
+  builder.root["accessors"][times]["min"] = {0};
+  builder.root["accessors"][times]["max"] = {2};
+  for (nlohmann::json& sampler : builder.root["animations"][0]["samplers"]) sampler["input"] = times;
+  folder.Write("c.gltf", builder.Text());
+  EXPECT_TRUE(Has(Starter(folder / "c.gltf"), "\nfps: 30  #"));
+  EXPECT_EQ(Reload(folder / "c.gltf").fps, 30);
+}
+
 TEST_F(RigWriterTest, AwkwardNamesAreQuoted) {
   GltfBuilder builder = GltfBuilder::Character();
   builder.root["nodes"][2]["name"] = "tip: \"left\" # \\ 1";

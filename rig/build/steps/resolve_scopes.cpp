@@ -1,5 +1,9 @@
 #include "rig/build/steps/resolve_scopes.h"
 
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+
 #include "rig/file/words.h"
 
 namespace kpsa::engine {
@@ -7,6 +11,14 @@ namespace {
 
 bool TakesPlugs(const AttributeDef& attribute) {
   return (IsSmallType(attribute.type) && attribute.type != Type::kEnum) || IsPointType(attribute.type);
+}
+
+// Words of a rig file whose values name nodes. Those of a blend shape's targets are the mesh's.
+bool NamesNodes(const NodeDef& def, std::string_view word) {
+  constexpr std::string_view kWords[] = {"parent",      "at",    "curve", "curves", "falloffs", "driver",
+                                         "constrained", "start", "mid",   "end",    "camera",   "lights"};
+  return std::ranges::find(kWords, word) != std::end(kWords) ||
+         (word == "targets" && def.name != "blendShape");
 }
 
 // The text with the prefix of the innermost scope that has a node of this name: up to the end, or what
@@ -42,8 +54,7 @@ void ResolveScopes(const RigNames& names, const NodeRegistry& registry, RigFile*
     if (!scoped(node.source) || def == nullptr) continue;
     for (RigAttribute& attribute : node.attributes) {
       if (IsRigWord(*def, attribute.name)) {
-        if (attribute.name == "parent" || attribute.name == "at" || attribute.name == "curve" ||
-            attribute.name == "falloffs" || (attribute.name == "falloff" && attribute.value.is_scalar()))
+        if (NamesNodes(*def, attribute.name) || (attribute.name == "falloff" && attribute.value.is_scalar()))
           InScope(names, *file, &attribute.value, attribute.source);
         if (attribute.name != "falloff" || !attribute.value.is_map()) continue;
         for (std::size_t i = 0; i < attribute.value.keys.size(); ++i) {
