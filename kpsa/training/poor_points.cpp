@@ -81,4 +81,9 @@ std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps&
   return worst;
 }
 
+std::vector<std::size_t> PoorPoints(const PointsOff& off, const TileSteps& steps, std::size_t every) {
+  std::vector<std::size_t> poor = PoorPoints(off.strict, steps, every);
+  return poor.empty() ? PoorPoints(off.plain, steps, every) : poor;
+}
+
 }  // namespace kpsa::engine

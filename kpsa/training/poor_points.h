@@ -48,4 +48,11 @@ struct TileSteps {
 std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps& steps,
                                     std::size_t every = 1);
 
+// By two bounds: those beyond the strict one, which keeps clips farther from the tolerance; where these are too many, cost
+// too much or have no step, those beyond the other.
+struct PointsOff {
+  PointsBeyond strict, plain;
+};
+std::vector<std::size_t> PoorPoints(const PointsOff& off, const TileSteps& steps, std::size_t every = 1);
+
 }  // namespace kpsa::engine

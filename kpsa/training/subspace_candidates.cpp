@@ -170,10 +170,10 @@ Result<PricedTiles> SubspaceCandidates::PriceTiles() {
 void SubspaceCandidates::FindPoor(const FrameCost& of_tiles) {
   const bool near = of_tiles.near > kManyNear;
   if (steps.ns.empty() || (of_tiles.misses <= kManyMisses && !near) || !std::isfinite(of_tiles.ns)) return;
-  PointsBeyond beyond;
-  TileErrors(poses->poses, tiles, fits_, &beyond);
+  PointsOff off;
+  TileErrors(poses->poses, tiles, fits_, &off);
   if (near) steps.most_points = kMostPoor;
-  poor = PoorPoints(beyond, steps);
+  poor = PoorPoints(off, steps);
 }
 
 // Of one with cues for all points, and of those with cues of each tile, the cheaper one.
@@ -379,15 +379,15 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
 
 // Tiles with inner points are others than those that said which points need them, and so are their cues.
 std::vector<std::size_t> SubspaceCandidates::FindMorePoor() {
-  PointsBeyond beyond;
+  PointsOff off;
   fits_ = FitTiles(tiles, poses->poses);
-  TileErrors(poses->poses, tiles, fits_, &beyond);
+  TileErrors(poses->poses, tiles, fits_, &off);
   const auto as_they_come_out = [&](std::vector<std::size_t> rows) {
     std::erase_if(rows, [&](std::size_t row) { return !setup->PointThatComesOut(row); });
     return rows;
   };
-  if (as_they_come_out(beyond.Worst(kManyBeyond)).empty()) return {};
-  return as_they_come_out(beyond.Worst(0));
+  if (as_they_come_out(off.plain.Worst(kManyBeyond)).empty()) return {};
+  return as_they_come_out(off.plain.Worst(0));
 }
 
 TileSubspace SubspaceCandidates::OfTiles(bool finely) {

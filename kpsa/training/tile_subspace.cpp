@@ -18,8 +18,8 @@ namespace kpsa::engine {
 namespace {
 
 // Of the tolerance: a point that is farther off in one pose goes through a last step, if it can; clips come back to their
-// poses, and go on from there
-constexpr double kPoor = 0.5, kPoorInClips = 0.25;
+// poses, and go on from there, so less is admitted in them
+constexpr double kPoor = 0.5, kOfClips = 0.5, kPoorStrictly = 0.3;
 constexpr double kBeforeStep = 0.4;     // of the budgets of a tile that gives what a last step reads
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
@@ -162,10 +162,13 @@ void FinishTiles(TileSubspace* made) {
 }
 
 Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, std::span<const TileModel> fits,
-                           PointsBeyond* beyond) {
+                           PointsOff* points_off) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
   const double tolerance = choice.options.tolerance;
-  if (beyond != nullptr) *beyond = PointsBeyond(poses.poses(), choice.candidates.size());
+  if (points_off != nullptr) {
+    points_off->strict = PointsBeyond(poses.poses(), choice.candidates.size());
+    points_off->plain = points_off->strict;
+  }
   Eigen::MatrixXf errors(count, static_cast<Eigen::Index>(choice.candidates.size()));
   ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
@@ -178,8 +181,12 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, st
                                 MultiplyFloats(GemmOperand::Dense(fitted.gain), GemmOperand::Dense(measured));
       const Eigen::MatrixXd off = PointErrors(fitted.target - told);
       errors.col(static_cast<Eigen::Index>(t)) = off.colwise().maxCoeff().cast<float>();
-      if (beyond != nullptr)
-        beyond->Set(t, off, kPoor * tolerance, kPoorInClips * tolerance, choice.options.clip_poses);
+      if (points_off == nullptr) continue;
+      const auto set = [&](PointsBeyond* beyond, double bound) {
+        beyond->Set(t, off, bound, kOfClips * bound, choice.options.clip_poses);
+      };
+      set(&points_off->strict, kPoorStrictly * tolerance);
+      set(&points_off->plain, kPoor * tolerance);
     }
   });
   return errors;
@@ -220,8 +227,7 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
     if (trial->errors.size() == 0) {
       std::vector<TileCandidates> some;
       for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
-      trial->errors =
-          TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options), {}, &trial->beyond);
+      trial->errors = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options), {}, &trial->off);
     }
     const Eigen::MatrixXf& errors = trial->errors;
     promising = keeps(errors) && ExpectedBeyond(errors, half, kTrialTiles) <= kMostBeyondHalf;
@@ -231,7 +237,7 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
       but_poor = keeps(errors, worst) &&
                  ExpectedBeyond(errors, half, kTrialTiles, worst) <= kOfOthers * kMostBeyondHalf;
     }
-    if (!promising && PoorPoints(trial->beyond, promise.steps, kTrialTiles).empty()) {
+    if (!promising && PoorPoints(trial->off, promise.steps, kTrialTiles).empty()) {
       if (!but_poor) return {};
       promising = true;
     }
@@ -239,10 +245,10 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
   if (!trial->chosen) *choice = ChooseTiles(mean, poses, candidates, options);
   trial->chosen = true;
   if (promising) return {true, {}};
-  PointsBeyond beyond;
-  const Eigen::MatrixXf errors = TileErrors(poses, *choice, {}, &beyond);
+  PointsOff off;
+  const Eigen::MatrixXf errors = TileErrors(poses, *choice, {}, &off);
   if (!many && keeps(errors)) return {true, {}};
-  PromisingTiles found{false, PoorPoints(beyond, promise.steps)};
+  PromisingTiles found{false, PoorPoints(off, promise.steps)};
   found.promising = but_poor && found.poor.empty();
   return found;
 }

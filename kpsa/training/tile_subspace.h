@@ -44,7 +44,7 @@ struct PromisingTiles {
 // What an earlier question found, of the same poses, candidates and options: errors of some tiles, and the choice.
 struct TriedTiles {
   Eigen::MatrixXf errors;
-  PointsBeyond beyond;
+  PointsOff off;
   bool chosen = false;
 };
 // The same where an eighth of many tiles says that the others are worth their time. choice: unchanged where trial has it;
@@ -70,7 +70,7 @@ void FinishTiles(TileSubspace* made);
 // [poses x tiles]; fits: as MakeTileSubspace has them, or empty. beyond: which points are beyond half the
 // tolerance, or a quarter in a frame of a clip.
 Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
-                           std::span<const TileModel> fits = {}, PointsBeyond* beyond = nullptr);
+                           std::span<const TileModel> fits = {}, PointsOff* off = nullptr);
 // Share of the poses in which a tile is farther off, but some of them.
 double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but = {});
 // The same of `every` times as many tiles, as far as each is beyond in poses of its own.

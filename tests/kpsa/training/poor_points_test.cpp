@@ -76,5 +76,20 @@ TEST(PoorPoints, AreNoneWhereTheyAreMany) {
   EXPECT_EQ(PoorPoints(beyond, steps).size(), 0u);
 }
 
+TEST(PoorPoints, AreThoseOfTheStrictBoundWhereTheyAreFewEnough) {
+  const auto beyond = [](std::size_t points) {
+    PointsBeyond found(1, 1);
+    Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(100, 1);
+    errors.topRows(static_cast<Eigen::Index>(points)).setConstant(2);
+    found.Set(0, errors, 1, 1, 0);
+    return found;
+  };
+  const TileSteps steps{.ns = {1}, .most_points = 0.1};
+  EXPECT_EQ(PoorPoints(PointsOff{beyond(10), beyond(3)}, steps).size(), 10u);
+  EXPECT_EQ(PoorPoints(PointsOff{beyond(11), beyond(3)}, steps).size(), 3u);
+  EXPECT_EQ(PoorPoints(PointsOff{beyond(11), beyond(12)}, steps).size(), 0u);
+  EXPECT_EQ(PoorPoints(PointsOff{beyond(0), beyond(0)}, steps).size(), 0u);
+}
+
 }  // namespace
 }  // namespace kpsa::engine
