@@ -10,6 +10,8 @@ target_compile_options(kpsa_settings INTERFACE -ffp-contract=off -fno-math-errno
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # False alarms about std::string (GCC bugs 105651 and 105329); from a precompiled header they are not hidden
   target_compile_options(kpsa_settings INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+  # Vectors of 32 bytes as parameters: of functions that are inlined, so that no ABI has them
+  target_compile_options(kpsa_settings INTERFACE -Wno-psabi)
   if(KPSA_UNITY)  # takes a source that is included for a header; and its garbage is not worth collecting (a tenth of the time)
     target_compile_options(kpsa_settings INTERFACE -Wno-subobject-linkage "SHELL:--param ggc-min-heapsize=1500000")
   endif()
