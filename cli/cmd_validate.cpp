@@ -77,7 +77,7 @@ void AddValidateCommand(CLI::App* program, Command* chosen) {
   CLI::App* command =
       AddCommand(program, "validate", "Every error of a rig or a character, with place and suggestion",
                  "Loads the file with all that it names, compiles it and evaluates its first frame. Exit 3 "
-                 "where something is wrong.\n"
+                 "where something is wrong, 4 where that frame fails or is not finite.\n"
                  "Examples:\n"
                  "  kpsa validate head.yaml\n"
                  "  kpsa validate head.glb --json",
