@@ -30,7 +30,7 @@ Result<BoundKernel> BindSculpt(const Binding& binding) {
                    0);
 }
 
-// The cube root; of a handle's determinant that is all but 1 by its series, as exact, in a tenth of the time.
+// The cube root, a fifth of a step; of a determinant that is all but 1, of a handle that is not scaled, by its series.
 double CubeRoot(double value) {
   const double beyond = value - 1;
   return std::fabs(beyond) < 1e-5 ? 1 + beyond * (1.0 / 3 - beyond * (1.0 / 9)) : std::cbrt(value);
@@ -49,9 +49,8 @@ void ComputeSculpt(SculptContext c) {
   // Lengths are world ones: the mean radius of the sphere as its handle scales it
   const double size = radius * CubeRoot(std::fabs(Determinant3(handle)));
   if (size > 0) {
-    const double per_size = 1 / size;
-    inputs.shape.dropoff_distance = c.get<"dropoffDistance">() * per_size;
-    inputs.shape.max_displacement = c.get<"maximumDisplacement">() * per_size;
+    inputs.shape.dropoff_distance = c.get<"dropoffDistance">() / size;
+    inputs.shape.max_displacement = c.get<"maximumDisplacement">() / size;
   }
   Matrix4 sphere_from_world;
   if (bound.mode == SculptMode::kStretch && Invert(handle, &sphere_from_world)) {

@@ -16,7 +16,7 @@ constexpr std::size_t kGrain = 2048;
 
 float Float(double value) { return static_cast<float>(value); }
 
-// fmod(half_turns, 2), which takes a third of a step: most angles are within a turn.
+// fmod(half_turns, 2), which takes a tenth of a step; most angles are within a turn.
 double WithinATurn(double half_turns) {
   return std::fabs(half_turns) < 2 ? half_turns : std::fmod(half_turns, 2.0);
 }
@@ -44,8 +44,7 @@ bool Prepare(const Bend& b, NonLinearRun* run) {
 }
 
 bool Prepare(const Twist& t, NonLinearRun* run) {
-  run->twist = {MakeAlong(t.low, t.high), Float(WithinATurn(t.start / kPi)),
-                Float((t.end - t.start) / kPi)};
+  run->twist = {MakeAlong(t.low, t.high), Float(WithinATurn(t.start / kPi)), Float((t.end - t.start) / kPi)};
   return t.start != 0 || t.end != 0;
 }
 

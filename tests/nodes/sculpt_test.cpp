@@ -177,6 +177,15 @@ TEST(Sculpt, TheHandlePlacesTheSphere) {
   }
 }
 
+// However the handle scales the sphere; around 1, where the mean radius is told by a series.
+TEST(Sculpt, TheLargestDisplacementIsAWorldLength) {
+  for (const double scale : {0.5, 1 - 4e-6, 1 - 3e-6, 1.0, 1 + 3e-6, 1 + 4e-6, 2.0}) {
+    SculptRig rig({{"radius", 0.25}, {"dropoffType", "none"}, {"maximumDisplacement", 0.01}});
+    rig.g.set("s.matrix", Translation({0.3, -0.2, 0.05}) * Scaling({scale, scale, scale}));
+    EXPECT_NEAR(MaxDistance(rig.Points(), rig.Rest()), 0.01, 1e-7) << scale;
+  }
+}
+
 TEST(Sculpt, InWorldSpaceTheParentSaysNothingAndInMeshSpaceItsMotionIsTakenOut) {
   const Matrix4 handle = Translation({0.3, 0.2, 0}),
                 motion = ComposeTrs({0, 3, 1}, Random(2).Rotation(), {1, 1, 1});
