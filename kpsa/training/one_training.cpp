@@ -21,6 +21,8 @@ constexpr double kMostPoorOfCheap = 0.05, kCheapPoints = 0.2;
 // Of the time so far, that is left where a training ends for another one: after cues for all points, and after a trial of
 // tiles
 constexpr double kToEnd = 2, kToEndEarly = 4;
+// Of a full frame, that clips are expected to lose: points are looked for that a step should give instead
+constexpr double kManyOfClips = 0.05;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -239,8 +241,14 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   }
   Subspace subspace = std::move(*made);
 
+  // What clips lose, another training with a step of some points may win
+  std::vector<std::size_t> poor;
+  if (may_end(1) && ends->steps != nullptr && rig.some.empty() &&
+      candidates.cost.lost_of_clips.value_or(0) > kManyOfClips)
+    poor = candidates.PoorOfClips(StepsOfTiles(setup, *ends->steps, kCheapPoints * setup.full_cost));
   const auto with_held = [&](Result<Trained> trained) {
     if (trained.ok()) trained->held = setup.sampler->held();
+    if (trained.ok() && !poor.empty()) trained->poor = WithStepped(setup, poor);
     return trained;
   };
   if (rig.some.empty())

@@ -27,7 +27,8 @@ struct Trained {
   bool ended = false;                        // as Ends allows: there is no subspace
   std::vector<std::size_t> untold = {};      // of these, that it gets wrong unnoticed (UntoldControls)
   std::vector<std::size_t> held = {};        // controls that no clip moves (HeldControls)
-  // With the points, by mesh, that are to blame: a last step should be of them alone. Empty: with its cues.
+  // The points, by mesh, that are to blame for that, or for what clips lose: a last step should be of them alone. Empty, where
+  // it ended: with its cues.
   std::vector<std::vector<Index>> poor = {};
 };
 

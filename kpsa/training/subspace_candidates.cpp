@@ -176,6 +176,14 @@ void SubspaceCandidates::FindPoor(const FrameCost& of_tiles) {
   poor = PoorPoints(off, steps);
 }
 
+std::vector<std::size_t> SubspaceCandidates::PoorOfClips(TileSteps of_steps) const {
+  if (!by_tile || fits_.empty()) return {};
+  PointsOff off;
+  TileErrors(poses->poses, tiles, fits_, &off);
+  of_steps.most_points = kMostPoor;
+  return PoorPoints(off, of_steps);
+}
+
 // Of one with cues for all points, and of those with cues of each tile, the cheaper one.
 Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.8));

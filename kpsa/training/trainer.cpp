@@ -208,8 +208,9 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   Result<Trained> whole = TrainOnce(rig, clips, options, mends, &ends);
   if (!whole.ok()) return whole;
   const double of_whole = CostOfClips(*whole);
-  if (!whole->ended && of_whole < kWorthSplitting * steps) return whole;
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
+  const bool cheap = !whole->ended && of_whole < kWorthSplitting * steps;
+  if (cheap && whole->poor.empty()) return whole;
   TrainOptions rest = options;
   rest.seconds = limit.left();
   std::optional<Trained> some;
@@ -217,11 +218,17 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     Result<Trained> made = TrainStepped(**split, whole->poor, clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
-      if (made->ns < enough && CostOfClips(*made) < AlikeOfExpected(*made, options) * of_whole) {
+      const double alike = whole->ended ? AlikeOfExpected(*made, options) : kCheaperInner;
+      if (made->ns < enough && CostOfClips(*made) < alike * of_whole) {
+        if (!whole->ended) NameTried(&*whole, "");
         AddTried(*whole, &*made);
         return made;
       }
       some = std::move(*made);
+    }
+    if (cheap) {
+      if (some) AddTried(*some, &*whole);
+      return whole;
     }
     rest.seconds = limit.left();
   }

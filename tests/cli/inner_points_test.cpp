@@ -389,5 +389,30 @@ TEST(InnerPointsOfRigs, AreOfThePointsThatNeedThem) {
   ExpectHitsNear(folder, first, options.tolerance);
 }
 
+// Few of the judges miss, but calibration costs clips more than a frame in twenty: what a step of some points would save is
+// then looked at, too.
+TEST(InnerPointsOfRigs, AreTakenForWhatClipsLose) {
+  const HelloFolder folder;
+  folder.Edit("mush: {type: deltaMush, iterations: 10}",
+              "mush: {type: deltaMush, iterations: 10, parent: lower}");
+  folder.Edit("divisions: [2, 5, 2], members: all}", "divisions: [2, 5, 2], members: all, parent: lower}");
+  folder.Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
+  TrainOptions options = InnerTraining(TrainOptions::Inner::kIfCheaper);
+  options.tolerance = 4e-3, options.many_tiles = 1, options.samples = 500;
+  options.violation_rate = 0.1, options.calibration_poses = 60;
+  const auto trained = TrainRig(folder.rig(), options, {"wave"});
+  ASSERT_NE(trained, nullptr);
+  EXPECT_GT(trained->outputs[0].stepped.points.size(), 0u);
+  double of_all = 0, taken = kInfinity;
+  for (const TrainingRecord::Tried& one : ParseTraining(trained->training).tried) {
+    if (one.what == kByTile) of_all = one.cost;
+    if (!one.taken) continue;
+    EXPECT_TRUE(one.what.ends_with(kBeforeLastStepOfSome)) << one.what;
+    taken = one.cost;
+  }
+  EXPECT_LT(taken, 0.5 * of_all) << "which had been calibrated";
+  ExpectHitsNear(folder, trained, options.tolerance);
+}
+
 }  // namespace
 }  // namespace kpsa::engine
