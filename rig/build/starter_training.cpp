@@ -96,17 +96,20 @@ Index ChooseTest(const gltf::Character& character, std::vector<ClipMotion> motio
 
 double FramesOfKeys(const std::vector<gltf::Clip>& clips) {
   constexpr double kUsual[] = {kUnsaidFps, 25, 30, 48, 50, 60}, kOff = 0.01;  // of a frame
-  const auto fits = [&](double fps) {
-    return std::ranges::all_of(clips, [&](const gltf::Clip& clip) {
-      return std::ranges::all_of(clip.channels, [&](const gltf::Channel& channel) {
-        return std::ranges::all_of(channel.times, [&](double time) {
-          return std::fabs(time * fps - std::round(time * fps)) <= kOff;
-        });
-      });
+  const auto fits = [](const gltf::Clip& clip, double fps) {
+    return std::ranges::all_of(clip.channels, [&](const gltf::Channel& channel) {
+      return std::ranges::all_of(
+          channel.times, [&](double time) { return std::fabs(time * fps - std::round(time * fps)) <= kOff; });
     });
   };
-  const auto* const found = std::ranges::find_if(kUsual, fits);
-  return found == std::end(kUsual) ? kUnsaidFps : *found;
+  double best = kUnsaidFps;
+  std::ptrdiff_t most = 0;
+  for (const double fps : kUsual) {
+    const auto fitting =
+        std::ranges::count_if(clips, [&](const gltf::Clip& clip) { return fits(clip, fps); });
+    if (fitting > most) most = fitting, best = fps;
+  }
+  return best;
 }
 
 std::vector<ClipPart> CutClip(const PointPoses& poses, std::int64_t frames, double fps) {

@@ -11,7 +11,7 @@
 namespace kpsa::engine {
 
 inline constexpr double kUnsaidFps = 24;  // of a rig that says nothing else
-// Frames a second that all keys of the clips fall onto: kUnsaidFps before others that are usual; it, too, where none fits.
+// Frames a second that the keys of most clips fall onto: kUnsaidFps before others that are usual; it, too, where none fits.
 double FramesOfKeys(const std::vector<gltf::Clip>& clips);
 
 // Frames [first, last] of a clip.

@@ -152,7 +152,7 @@ connections:
   EXPECT_TRUE(Has(text, "t.yaml:14:5: b.scale is driven by a.scale already")) << text;
   EXPECT_TRUE(Has(text,
                   "t.yaml:15:5: a clip drives body_blendShape.weight[up]: write {from: r.outValue, to: "
-                  "body_blendShape.weight[up], override: true}"))
+                  "\"body_blendShape.weight[up]\", override: true}"))
       << text;
   EXPECT_TRUE(Has(text, "t.yaml:16:5: a clip drives tip.offsetParentMatrix")) << text;
 }

@@ -66,6 +66,14 @@ TEST_F(RigWriterTest, FramesASecondAreThoseOfTheKeys) {
   EXPECT_EQ(of_keys({static_cast<double>(1 / 30.0f), static_cast<double>(301 / 30.0f)}), 30);
   EXPECT_EQ(of_keys({0, 1 / 60.0}), 60);
   EXPECT_EQ(of_keys({0.0123, 1.77}), 24) << "none";
+  std::vector<gltf::Clip> mixed(3);
+  for (const double rate : {24.0, 30.0, 30.0}) {
+    gltf::Clip& clip = mixed[rate == 24 ? 0 : mixed[1].channels.empty() ? 1 : 2];
+    clip.channels.emplace_back().times = {0, 1 / rate, 7 / rate};
+  }
+  EXPECT_EQ(FramesOfKeys(mixed), 30) << "of most";
+  mixed.pop_back();
+  EXPECT_EQ(FramesOfKeys(mixed), 24) << "of as many";
   GltfBuilder builder = GltfBuilder::Character();
   EXPECT_FALSE(Has(Starter(folder.Write("whole.gltf", builder.Text())), "fps"));
   const int times = builder.Accessor(std::vector<float>{0, 1 / 30.0f, 2}, "SCALAR");

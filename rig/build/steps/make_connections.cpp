@@ -4,6 +4,7 @@
 #include <map>
 
 #include "rig/build/references.h"
+#include "rig/build/starter_text.h"
 #include "rig/graph_editor.h"
 
 namespace kpsa::engine {
@@ -97,8 +98,9 @@ class Connections {
     if (IsClipPlug(in_.rig.scene, *graph_, to)) {
       if (!override_clip) {
         in_.Fail(where, Status::Invalid(
-                            "a clip drives {0}: write {{from: {1}, to: {0}, override: true}} to take it over",
-                            graph_->PlugName(to), graph_->PlugName(from)));
+                            "a clip drives {}: write {{from: {}, to: {}, override: true}} to take it over",
+                            graph_->PlugName(to), Quoted(graph_->PlugName(from), true),
+                            Quoted(graph_->PlugName(to), true)));
         return;
       }
       replace = true;
