@@ -121,6 +121,8 @@ struct TriangleTree::Impl {
   // All triangles that may be nearer to the place than the limit, which visit(triangle) gives anew. Squared.
   template <typename Visit>
   void ForNear(Double3 place, double limit, Visit visit) const;
+  // No more than the distance of the place from the box of the triangle's corners; 0 where one of these is no number. Squared.
+  double Apart(Index triangle, Double3 place) const;
   // Its nearest place; none (kNoIndex, infinitely far) beyond the limit. Squared.
   SurfacePoint On(Index triangle, Double3 place, double limit) const;
   void Follow(Line* line, Double3 start, Double3 direction, float near, float far) const;
@@ -199,29 +201,50 @@ void TriangleTree::Impl::ForNear(Double3 place, double limit, Visit visit) const
     return;
   }
   struct Search {
+    const Impl* tree;
+    Double3 place;
     Visit visit;
-    double limit, rounding;
+    double limit, rounding, reach = kInfinity;
+    void SetReach() { reach = std::sqrt(limit) * (1 + kRounding) + rounding; }
     float Radius() const {
-      const double radius = std::sqrt(limit) * (1 + kRounding) + rounding;
-      return radius < 4 * double{kFar} ? static_cast<float>(radius) : std::numeric_limits<float>::infinity();
+      return reach < 4 * double{kFar} ? static_cast<float>(reach) : std::numeric_limits<float>::infinity();
     }
   };
   RTCPointQuery query = {Clamped(place.x), Clamped(place.y), Clamped(place.z), 0, 0};
-  Search search{visit, limit,
+  Search search{this, place, visit, limit,
                 kRounding * std::max({std::fabs(query.x), std::fabs(query.y), std::fabs(query.z)})};
   search.rounding += 1e-18;
+  search.SetReach();
   query.radius = search.Radius();
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   const auto meet = [](RTCPointQueryFunctionArguments* args) {
     auto& at = *static_cast<Search*>(args->userPtr);
+    // A leaf holds several triangles, and Embree looks at its box alone
+    if (const double reach = at.reach; at.tree->Apart(args->primID, at.place) > reach * reach) return false;
     const double now = at.visit(args->primID);
     if (!(now < at.limit)) return false;
     at.limit = now;
+    at.SetReach();
     args->query->radius = at.Radius();
     return true;
   };
   rtcPointQuery(scene.get(), &query, &context, meet, &search);
+}
+
+double TriangleTree::Impl::Apart(Index triangle, Double3 place) const {
+  const Index* corner = &triangles[3 * std::size_t{triangle}];
+  const ConstPointsView at = view();
+  double squared = 0;
+  const auto add = [&](const float* row, double x) {
+    const auto a = static_cast<double>(row[corner[0]]), b = static_cast<double>(row[corner[1]]),
+               c = static_cast<double>(row[corner[2]]);
+    // What is no number is neither below nor above
+    const double out = std::max({std::min({a - x, b - x, c - x}), std::min({x - a, x - b, x - c}), 0.0});
+    squared += a + b + c == a + b + c ? out * out : 0;
+  };
+  add(at.x, place.x), add(at.y, place.y), add(at.z, place.z);
+  return squared;
 }
 
 SurfacePoint TriangleTree::Impl::On(Index triangle, Double3 place, double limit) const {
@@ -279,11 +302,12 @@ void TriangleTree::Move(ConstPointsView points) {
   impl_->Refit();
 }
 
-SurfacePoint TriangleTree::Closest(Double3 place, double max_distance) const {
+SurfacePoint TriangleTree::Closest(Double3 place, double max_distance, Index near) const {
   SurfacePoint best;
-  if (impl_ == nullptr) return best;
+  if (impl_ == nullptr || !IsFinite(place)) return best;
   const double limit = max_distance * max_distance;
-  impl_->ForNear(place, limit, [&](Index t) {
+  if (near < impl_->count()) best = impl_->On(near, place, limit);
+  impl_->ForNear(place, std::min(limit, best.squared), [&](Index t) {
     const SurfacePoint found = impl_->On(t, place, limit);
     if (Less(found, best)) best = found;
     return best.squared;

@@ -55,8 +55,10 @@ class TriangleTree {
   // As many points as there were. Costs a comparison where they are the same; allocates nothing of its own.
   void Move(ConstPointsView points);
 
-  // The nearest place within the distance.
-  SurfacePoint Closest(Double3 place, double max_distance = std::numeric_limits<double>::infinity()) const;
+  // The nearest place within the distance. near: a triangle that may be near, as that of a place beside it: the same is found,
+  // and sooner; kNoIndex: none is known.
+  SurfacePoint Closest(Double3 place, double max_distance = std::numeric_limits<double>::infinity(),
+                       Index near = kNoIndex) const;
   // The place on the triangle of the lowest number that has one within the distance: for short distances.
   SurfacePoint Lowest(Double3 place, double max_distance) const;
   // The nearest `count` triangles within the distance, each with its nearest place: near ones first.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/check.h"
@@ -108,10 +109,11 @@ bool ShrinkWrapKernel::Stays(double signed_distance, double offset) const noexce
   return false;
 }
 
-std::optional<Double3> ShrinkWrapKernel::Nearest(const TriangleTree& target, Double3 p,
-                                                 double offset) const noexcept {
-  const SurfacePoint place = target.Closest(p);
+std::optional<Double3> ShrinkWrapKernel::Nearest(const TriangleTree& target, Double3 p, double offset,
+                                                 Index* near) const noexcept {
+  const SurfacePoint place = target.Closest(p, std::numeric_limits<double>::infinity(), *near);
   if (place.triangle == kNoIndex) return std::nullopt;
+  *near = place.triangle;
   if (offset == 0 && settings_.side == ShrinkWrapSettings::Side::kSurface) return place.point;
   const Double3 normal = Pseudonormal(target, place), away = p - place.point;
   const double distance = Length(away);
@@ -124,7 +126,7 @@ std::optional<Double3> ShrinkWrapKernel::Nearest(const TriangleTree& target, Dou
 }
 
 std::optional<Double3> ShrinkWrapKernel::AlongLine(const TriangleTree& target, Double3 p, Double3 line,
-                                                   double offset) const noexcept {
+                                                   double offset, Index* near) const noexcept {
   if (settings_.reverse) line = line * -1.0;
   LineHit hit = target.FirstHit(p, line);
   if (settings_.bidirectional) {
@@ -135,7 +137,7 @@ std::optional<Double3> ShrinkWrapKernel::AlongLine(const TriangleTree& target, D
     }
   }
   if (hit.triangle == kNoIndex)
-    return settings_.closest_if_no_intersection ? Nearest(target, p, offset) : std::nullopt;
+    return settings_.closest_if_no_intersection ? Nearest(target, p, offset, near) : std::nullopt;
   // Towards the face from behind: the point is inside
   const bool inside = Dot(line, FaceNormal(target, hit.triangle)) > 0;
   if (Stays(inside ? -hit.t : hit.t, offset)) return std::nullopt;
@@ -174,6 +176,7 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
   }
 
   ForRanges(parallel, point_count(), kShrinkWrapGrain, [&](std::size_t begin, std::size_t end) {
+    Index near = kNoIndex;  // points that follow each other mostly lie beside each other
     for (std::size_t i = begin; i < end; ++i) {
       const float w = weights_[i] * envelope;
       const Double3 p = At(in, entries_[i]);
@@ -181,13 +184,14 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
       if (w == 0) {
         goal = std::nullopt;
       } else if (settings_.projection == ShrinkWrapSettings::Projection::kClosest) {
-        goal = Nearest(target, p, inputs.offset);
+        goal = Nearest(target, p, inputs.offset, &near);
       } else if (settings_.projection == ShrinkWrapSettings::Projection::kAxis) {
-        goal = AlongLine(target, p, inputs.axis, inputs.offset);
+        goal = AlongLine(target, p, inputs.axis, inputs.offset, &near);
       } else {
         const Double3 normal = At(normals, normal_of_[i]);
-        goal =
-            std::isnan(normal.x + normal.y + normal.z) ? normal : AlongLine(target, p, normal, inputs.offset);
+        goal = std::isnan(normal.x + normal.y + normal.z)
+                   ? normal
+                   : AlongLine(target, p, normal, inputs.offset, &near);
       }
       const Double3 moved = goal.has_value() ? p + (*goal - p) * static_cast<double>(w) : p;
       out.x[i] = static_cast<float>(moved.x);

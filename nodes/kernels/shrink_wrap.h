@@ -64,9 +64,11 @@ class ShrinkWrapKernel {
   bool MovesTarget() const { return !(stage_from_target_ == Matrix4()); }
   Double3 FaceNormal(const TriangleTree& target, Index triangle) const noexcept;
   Double3 Pseudonormal(const TriangleTree& target, const SurfacePoint& place) const noexcept;
-  std::optional<Double3> Nearest(const TriangleTree& target, Double3 p, double offset) const noexcept;
-  std::optional<Double3> AlongLine(const TriangleTree& target, Double3 p, Double3 line,
-                                   double offset) const noexcept;
+  // near: a triangle that may be near; then the nearest.
+  std::optional<Double3> Nearest(const TriangleTree& target, Double3 p, double offset,
+                                 Index* near) const noexcept;
+  std::optional<Double3> AlongLine(const TriangleTree& target, Double3 p, Double3 line, double offset,
+                                   Index* near) const noexcept;
   bool Stays(double signed_distance, double offset) const noexcept;
 
   ShrinkWrapSettings settings_;

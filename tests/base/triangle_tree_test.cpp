@@ -128,11 +128,18 @@ TEST(TriangleTree, FindsWhatAllTrianglesGive) {
       ASSERT_EQ(found.triangle, expected.triangle) << i;
       EXPECT_EQ(found.squared, expected.squared);
       EXPECT_EQ(found.point, expected.point);
+      // Wherever it begins
+      for (const Index near : {expected.triangle, static_cast<Index>(i), static_cast<Index>(i % count)}) {
+        const SurfacePoint same = soup.tree.Closest(p, kInfinity, near);
+        EXPECT_EQ(same.triangle, expected.triangle) << near;
+        EXPECT_EQ(same.point, expected.point) << near;
+      }
       // A limit hides what is beyond it, and nothing else
       const double distance = std::sqrt(expected.squared);
       EXPECT_EQ(soup.Closest(p, distance * 1.001 + 1e-9).triangle, expected.triangle);
       if (distance > 1e-6) {
         EXPECT_EQ(soup.Closest(p, distance * 0.999).triangle, kNoIndex);
+        EXPECT_EQ(soup.tree.Closest(p, distance * 0.999, expected.triangle).triangle, kNoIndex);
       }
     }
   }
@@ -151,6 +158,7 @@ TEST(TriangleTree, TiesGoToTheLowerTriangle) {
   const Soup soup(xyz, triangles);
   EXPECT_EQ(soup.Closest({0, 0, -1}).triangle, 0u);
   EXPECT_EQ(soup.Closest({0.01, -0.02, -3}).triangle, 0u);
+  EXPECT_EQ(soup.tree.Closest({0, 0, -1}, kInfinity, 17).triangle, 0u) << "also where it begins elsewhere";
   // On the edge between the blades 20 and 21, from outside of the cone
   const SurfacePoint edge =
       soup.Closest({soup.view().x[22] * 0.5 * 1.7, soup.view().y[22] * 0.5 * 1.7, 0.35 - 0.5});
