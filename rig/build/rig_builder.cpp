@@ -23,6 +23,7 @@
 #include "rig/build/steps/make_connections.h"
 #include "rig/build/steps/measure_rest.h"
 #include "rig/build/steps/note_double_moves.h"
+#include "rig/build/steps/note_lost_weights.h"
 #include "rig/build/steps/place_falloffs.h"
 #include "rig/build/steps/place_handles.h"
 #include "rig/build/steps/place_stages.h"
@@ -102,6 +103,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   FinishOverrides(in, reader.overridden(), stacked, &rig->pinned, graph);
   CheckVariants(in, nodes);
   NoteDoubleMoves(in, nodes, &rig->notes);
+  NoteLostWeights(*scene, *graph, &rig->notes);
 
   // What the rig is for
   AddControls(in, &rig->controls);

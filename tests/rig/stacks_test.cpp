@@ -114,6 +114,24 @@ accelerate: {a: {points: ["body@cage"], space: tip, tolerance: 0.5mm, test: {cli
   EXPECT_TRUE(Has(rig.notes[0], "\"idle\" is in no stack")) << rig.notes[0];
 }
 
+// A blendShape of the rig in the place of the file's own: clips move that one alone.
+TEST_F(RigStacks, WeightsThatClipsMoveForNothingAreNoted) {
+  const std::string shapes = "nodes:\n  face: {type: blendShape, targets: [up]}\n";
+  const std::string without = "deform: [{meshes: body, stack: [face, skin]}]\n";
+  const auto notes = [&](const std::string& text) { return Loaded(text).notes; };
+  const std::vector<std::string> lost = notes(shapes + without);
+  ASSERT_EQ(lost.size(), 1u);
+  EXPECT_TRUE(Has(lost[0], "clips move body_blendShape.weight, which the stack of body leaves out"))
+      << lost[0];
+  EXPECT_TRUE(Has(lost[0], "from: \"body_blendShape.weight[NAME]\", to: \"face.weight[NAME]\"")) << lost[0];
+  for (const std::string& text :
+       {shapes + "deform: [{meshes: body, stack: [morph, face, skin]}]\n",
+        shapes + without +
+            "connections:\n  - {from: \"body_blendShape.weight[up]\", to: \"face.weight[up]\"}\n",
+        std::string("deform: [{meshes: body, stack: [skin]}]\n")})
+    EXPECT_TRUE(notes(text).empty()) << text;
+}
+
 TEST_F(RigStacks, AVectorAndItsComponentsAreNotSetTogether) {
   const std::string a = "nodes:\n  a: {type: transform}\n";
   EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: [1, 2, 3], translateY: 7}\n"),
@@ -142,7 +160,8 @@ accelerate:
   b: {points: [bode@skin], train: {samples: 10}}
 )");
   EXPECT_TRUE(Has(text, "t.yaml:5:36: unknown deformer \"mosh\" (did you mean \"mush\"?)")) << text;
-  EXPECT_TRUE(Has(text, "unknown deformer \"wobbler\"; expected a deformer of \"nodes\", or gltf, morph")) << text;
+  EXPECT_TRUE(Has(text, "unknown deformer \"wobbler\"; expected a deformer of \"nodes\", or gltf, morph"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:5:42: \"t\" is a transform, no deformer")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:5:45: \"morph\" brings the stage morph of \"body\" a second time")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:6:15: mesh \"body\" has a stack already, at t.yaml:5:15")) << text;
