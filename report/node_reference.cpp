@@ -8,10 +8,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
+#include <vector>
 
 #include "files/quantity.h"
 #include "report/json_text.h"
 #include "report/table.h"
+#include "rig/file/words.h"
 
 namespace kpsa::engine {
 namespace {
@@ -68,6 +70,13 @@ Table AttributeTable(const NodeDef& def) {
   return table;
 }
 
+// Keys of a node in a rig that are no attributes (docs/rig-format.md); empty where it has none.
+Table KeyTable(const std::vector<RigWord>& words) {
+  Table table({"key in a rig", "what it is"});
+  for (const RigWord& word : words) table.Row({word.name, word.doc});
+  return table;
+}
+
 nlohmann::ordered_json DefJson(const NodeDef& def) {
   nlohmann::ordered_json attributes = nlohmann::ordered_json::array();
   for (const AttributeDef& a : def.attributes) {
@@ -82,13 +91,16 @@ nlohmann::ordered_json DefJson(const NodeDef& def) {
     if (!a.aliases.empty()) json["aliases"] = a.aliases;
     attributes.push_back(std::move(json));
   }
+  nlohmann::ordered_json keys = nlohmann::ordered_json::array();
+  for (const RigWord& word : RigWordsOf(def)) keys.push_back({{"name", word.name}, {"doc", word.doc}});
   return {{"name", def.name},
           {"doc", def.doc},
           {"category", def.category},
           {"version", def.version},
           {"animation", def.animation},
           {"stateful", def.stateful},
-          {"attributes", std::move(attributes)}};
+          {"attributes", std::move(attributes)},
+          {"rig_keys", std::move(keys)}};
 }
 
 std::map<std::string, NodeDefs> ByCategory(const NodeDefs& defs) {
@@ -111,6 +123,7 @@ std::string NodesMarkdown(const NodeDefs& defs,
           has_picture(def->name) ? fmt::format("![{0}: before and after](nodes/{0}.png)\n\n", def->name) : "";
       text += fmt::format("\n### {}\n\n{}\n\n{}{}", def->name, def->doc, picture,
                           AttributeTable(*def).Markdown());
+      if (const auto words = RigWordsOf(*def); !words.empty()) text += "\n" + KeyTable(words).Markdown();
     }
   }
   return text;
@@ -125,7 +138,10 @@ std::string NodesText(const NodeDefs& defs) {
 }
 
 std::string NodeText(const NodeDef& def) {
-  return fmt::format("{} ({})\n{}\n\n{}", def.name, def.category, def.doc, AttributeTable(def).Text());
+  std::string text =
+      fmt::format("{} ({})\n{}\n\n{}", def.name, def.category, def.doc, AttributeTable(def).Text());
+  if (const auto words = RigWordsOf(def); !words.empty()) text += "\n" + KeyTable(words).Text();
+  return text;
 }
 
 std::string NodesJson(const NodeDefs& defs) {

@@ -197,6 +197,19 @@ TEST(NodeReference, IsWhatTheProgramPrints) {
       "line ");
 }
 
+// What a rig may write besides attributes.
+TEST(NodeReference, TellsTheKeysOfRigs) {
+  const ProcessResult text = RunKpsa({"nodes", "blendShape"}), json = RunKpsa({"nodes", "curve", "--json"});
+  EXPECT_NE(text.out.find("key in a rig"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("inbetweens    other targets that a target goes through"), std::string::npos)
+      << text.out;
+  EXPECT_EQ(RunKpsa({"nodes", "multiplyDivide"}).out.find("key in a rig"), std::string::npos);
+  const Json curve = Json::parse(json.out, nullptr, false);
+  std::vector<std::string> keys;
+  for (const Json& key : curve["nodes"][0]["rig_keys"]) keys.push_back(key["name"].get<std::string>());
+  EXPECT_EQ(keys, (std::vector<std::string>{"parent", "vertices", "mesh", "places", "closed"}));
+}
+
 // Each deformer has one, small, and as committed.
 TEST(NodeReference, PicturesShowWhatEveryDeformerDoes) {
   NodeRegistry registry;
