@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/near_names.h"
 #include "rig/build/references.h"
 #include "rig/file/values.h"
 #include "rig/file/words.h"
@@ -39,6 +40,12 @@ void PlugReader::ReadAttribute(const MadeNode& made, const RigAttribute& attribu
       if (!a.output) names.push_back(a.name);
     }
     for (const RigWord& word : RigWordsOf(def)) names.push_back(word.name);
+    if (NearNames(attribute.name, names).empty()) {
+      in_.errors->Add(attribute.key,
+                      "node \"{0}\" ({1}) has no attribute \"{2}\"; kpsa nodes {1} tells what it has",
+                      made.from->name, def.name, attribute.name);
+      return;
+    }
     in_.errors->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,
                     attribute.name, DidYouMean(attribute.name, names));
     return;

@@ -98,7 +98,9 @@ TEST_F(RigBuilderTest, CollectsErrorsOfNodes) {
   EXPECT_TRUE(Has(text, "t.yaml:15:3: \"skin\" is a word of stacks")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:16:3: a node named \"tip\" exists already")) << text;
   EXPECT_TRUE(Has(text, "l.input is an array: expected a list")) << text;
-  EXPECT_TRUE(Has(text, "node \"n\" (multMatrix) has no attribute \"parent\"")) << text;
+  EXPECT_TRUE(Has(
+      text, "node \"n\" (multMatrix) has no attribute \"parent\"; kpsa nodes multMatrix tells what it has"))
+      << text;
 }
 
 TEST_F(RigBuilderTest, ConnectsAndConverts) {
