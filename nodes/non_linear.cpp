@@ -43,8 +43,11 @@ void DeclareHandle(NodeBuilder& b) {
 }
 
 void DeclareBounds(NodeBuilder& b) {
-  b.in("lowBound", -1.0, {.max = 0, .doc = "where it begins on the handle's Y axis"});
-  b.in("highBound", 1.0, {.min = 0, .doc = "where it ends"});
+  b.in(
+      "lowBound", -1.0,
+      {.max = 0,
+       .doc = "where it begins on the handle's Y axis, in its units: numbers, that its scale makes lengths"});
+  b.in("highBound", 1.0, {.min = 0, .doc = "where it ends, likewise"});
 }
 
 void DeclareBend(NodeBuilder& b) {
