@@ -304,7 +304,7 @@ void TriangleTree::Move(ConstPointsView points) {
 
 SurfacePoint TriangleTree::Closest(Double3 place, double max_distance, Index near) const {
   SurfacePoint best;
-  if (impl_ == nullptr || !IsFinite(place)) return best;
+  if (impl_ == nullptr) return best;
   const double limit = max_distance * max_distance;
   if (near < impl_->count()) best = impl_->On(near, place, limit);
   impl_->ForNear(place, std::min(limit, best.squared), [&](Index t) {

@@ -243,9 +243,12 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
 
   // What clips lose, another training with a step of some points may win
   std::vector<std::size_t> poor;
-  if (may_end(1) && ends->steps != nullptr && rig.some.empty() &&
-      candidates.cost.lost_of_clips.value_or(0) > kManyOfClips)
-    poor = candidates.PoorOfClips(StepsOfTiles(setup, *ends->steps, kCheapPoints * setup.full_cost));
+  if (may_end(1) && ends->steps != nullptr && rig.some.empty() && candidates.by_tile &&
+      candidates.cost.lost_of_clips.value_or(0) > kManyOfClips) {
+    TileSteps of_steps = StepsOfTiles(setup, *ends->steps, kCheapPoints * setup.full_cost);
+    of_steps.most_points = kMostPoor;
+    poor = candidates.PoorOf(of_steps);
+  }
   const auto with_held = [&](Result<Trained> trained) {
     if (trained.ok()) trained->held = setup.sampler->held();
     if (trained.ok() && !poor.empty()) trained->poor = WithStepped(setup, poor);

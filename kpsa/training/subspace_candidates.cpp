@@ -170,18 +170,14 @@ Result<PricedTiles> SubspaceCandidates::PriceTiles() {
 void SubspaceCandidates::FindPoor(const FrameCost& of_tiles) {
   const bool near = of_tiles.near > kManyNear;
   if (steps.ns.empty() || (of_tiles.misses <= kManyMisses && !near) || !std::isfinite(of_tiles.ns)) return;
-  PointsOff off;
-  TileErrors(poses->poses, tiles, fits_, &off);
   if (near) steps.most_points = kMostPoor;
-  poor = PoorPoints(off, steps);
+  poor = PoorOf(steps);
 }
 
-std::vector<std::size_t> SubspaceCandidates::PoorOfClips(TileSteps of_steps) const {
-  if (!by_tile || fits_.empty()) return {};
+std::vector<std::size_t> SubspaceCandidates::PoorOf(const TileSteps& of) const {
   PointsOff off;
   TileErrors(poses->poses, tiles, fits_, &off);
-  of_steps.most_points = kMostPoor;
-  return PoorPoints(off, of_steps);
+  return PoorPoints(off, of);
 }
 
 // Of one with cues for all points, and of those with cues of each tile, the cheaper one.

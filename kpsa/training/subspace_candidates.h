@@ -88,8 +88,8 @@ struct SubspaceCandidates {
   bool IsWorthTrying(const FrameCost& of) const;
   // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
   Result<double> LeastForAllPoints() const;
-  // The points that `of_steps` should be of, as far as cues of tiles were trained: those that poses take far from the tolerance.
-  std::vector<std::size_t> PoorOfClips(TileSteps of_steps) const;
+  // The points that these steps should be of, where cues of tiles were chosen: those that poses take far from the tolerance.
+  std::vector<std::size_t> PoorOf(const TileSteps& of) const;
   double alike() const;         // at how much more cues of tiles are taken
   bool by_tiles_alone() const;  // the rig has some points before a last step
   // Nobody knows what all points would measure.

@@ -22,6 +22,14 @@ TrainOptions InnerTraining(TrainOptions::Inner inner = TrainOptions::Inner::kAlw
   return options;
 }
 
+// Points lie in the space of a joint, and so does what deforms them.
+void CarryByLower(const HelloFolder& folder) {
+  folder.Edit("mush: {type: deltaMush, iterations: 10}",
+              "mush: {type: deltaMush, iterations: 10, parent: lower}");
+  folder.Edit("divisions: [2, 5, 2], members: all}", "divisions: [2, 5, 2], members: all, parent: lower}");
+  folder.Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
+}
+
 // Which points go through the step: of tiles, as files of version 12 have them, or any. These lie about the bend.
 enum class Stepped : std::uint8_t { kAll, kTiles, kPoints };
 
@@ -53,11 +61,7 @@ class InnerPoints : public ::testing::TestWithParam<Stepped> {
   }
   static void WriteRig() {
     folder_ = new HelloFolder;
-    folder_->Edit("divisions: [2, 5, 2], members: all}",
-                  "divisions: [2, 5, 2], members: all, parent: lower}");
-    folder_->Edit("mush: {type: deltaMush, iterations: 10}",
-                  "mush: {type: deltaMush, iterations: 10, parent: lower}");
-    folder_->Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
+    CarryByLower(*folder_);
   }
   static void TearDownTestSuite() {
     trained_.reset(), prepared_.clear();
@@ -354,10 +358,7 @@ TEST(InnerPointsOfRigs, AnotherEnvelopeMisses) {
 // Training finds the points: those of the bend, and fewer for a larger tolerance; also where it looks at some of them.
 TEST(InnerPointsOfRigs, AreOfThePointsThatNeedThem) {
   const HelloFolder folder;
-  folder.Edit("mush: {type: deltaMush, iterations: 10}",
-              "mush: {type: deltaMush, iterations: 10, parent: lower}");
-  folder.Edit("divisions: [2, 5, 2], members: all}", "divisions: [2, 5, 2], members: all, parent: lower}");
-  folder.Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
+  CarryByLower(folder);
   std::vector<std::size_t> stepped;
   for (const auto& [tolerance, many] : {std::pair{2e-4, 24'000u}, {2e-3, 24'000u}, {2e-3, 500u}}) {
     SCOPED_TRACE(fmt::format("{} {}", tolerance, many));
@@ -393,10 +394,7 @@ TEST(InnerPointsOfRigs, AreOfThePointsThatNeedThem) {
 // then looked at, too.
 TEST(InnerPointsOfRigs, AreTakenForWhatClipsLose) {
   const HelloFolder folder;
-  folder.Edit("mush: {type: deltaMush, iterations: 10}",
-              "mush: {type: deltaMush, iterations: 10, parent: lower}");
-  folder.Edit("divisions: [2, 5, 2], members: all}", "divisions: [2, 5, 2], members: all, parent: lower}");
-  folder.Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
+  CarryByLower(folder);
   TrainOptions options = InnerTraining(TrainOptions::Inner::kIfCheaper);
   options.tolerance = 4e-3, options.many_tiles = 1, options.samples = 500;
   options.violation_rate = 0.1, options.calibration_poses = 60;
