@@ -1,6 +1,7 @@
 #include "base/triangle_tree.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -15,6 +16,9 @@ constexpr std::size_t kFew = 8;  // triangles: they are looked at one by one
 constexpr float kFar = 1e18f;    // Embree takes no larger coordinates
 // What rounding to floats may do, on Embree's side too, of the largest coordinate: 16 steps
 constexpr double kRounding = 2e-6;
+// What rounding leaves certain, of squares; and of triangles of which it leaves that, the sine of an angle
+constexpr double kClearly = 1e-9, kSlender = 1e-9;
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kLeastMargin = 1e-30f;  // Embree may take smaller numbers for 0
 
 Double3 At(ConstPointsView points, Index i) { return {points.x[i], points.y[i], points.z[i]}; }
@@ -82,31 +86,54 @@ float Reach(double along) {
   return reach < kFar ? static_cast<float>(reach) : std::numeric_limits<float>::infinity();
 }
 
-}  // namespace
-
-SurfacePoint ClosestOnTriangle(ConstPointsView points, const Index corners[3], Double3 place) {
+// ClosestOnTriangle; or nothing, where the triangle is clearly farther off than the bound. Squared.
+SurfacePoint ClosestWithin(ConstPointsView points, const Index corners[3], Double3 place, double bound) {
   SurfacePoint best;
   const Double3 a = At(points, corners[0]), b = At(points, corners[1]), c = At(points, corners[2]);
-  const Double3 normal = Cross(b - a, c - a);
+  const Double3 side[3] = {b - a, c - b, a - c}, normal = Cross(side[0], c - a);
   const double square = Dot(normal, normal);
+  bool asked[3] = {true, true, true};
   if (square > 0 && std::isfinite(square)) {
-    const double u = Dot(normal, Cross(c - b, place - b)), v = Dot(normal, Cross(a - c, place - c)),
-                 w = Dot(normal, Cross(b - a, place - a));
-    if (u > 0 && v > 0 && w > 0) {  // above the inside
-      const double sum = u + v + w;
+    // How far inside of each side, times its length and the normal's
+    const double inside[3] = {Dot(normal, Cross(side[0], place - a)), Dot(normal, Cross(side[1], place - b)),
+                              Dot(normal, Cross(side[2], place - c))};
+    if (inside[0] > 0 && inside[1] > 0 && inside[2] > 0) {
+      const double u = inside[1], v = inside[2], w = inside[0], sum = u + v + w;
       best.weights[0] = u / sum, best.weights[1] = v / sum, best.weights[2] = w / sum;
       best.point = a * best.weights[0] + b * best.weights[1] + c * best.weights[2];
       const Double3 offset = place - best.point;
       best.squared = Dot(offset, offset);
       return best;
     }
+    // The nearest place lies on a side that the place is outside of
+    const double length[3] = {Dot(side[0], side[0]), Dot(side[1], side[1]), Dot(side[2], side[2])},
+                 height = Dot(normal, place - a), slender = kSlender * length[0] * length[2];
+    for (int k = 0; k < 3 && square > slender; ++k) {
+      const double across = inside[k] * inside[k], scale = square * length[k];
+      if (inside[k] > 0) {
+        asked[k] = !(across > kClearly * scale * length[k]);
+      } else if (height * height * length[k] + across > (1 + kClearly) * bound * scale) {
+        return best;
+      }
+    }
   }
-  for (int k = 0; k < 3; ++k) ClosestOnSegment(points, corners, k, (k + 1) % 3, place, &best);
+  for (int k = 0; k < 3; ++k) {
+    if (asked[k]) ClosestOnSegment(points, corners, k, (k + 1) % 3, place, &best);
+  }
   return best;
 }
 
+}  // namespace
+
+SurfacePoint ClosestOnTriangle(ConstPointsView points, const Index corners[3], Double3 place) {
+  return ClosestWithin(points, corners, place, kInfinity);
+}
+
 struct TriangleTree::Impl {
+  using Row = std::array<float, 4>;  // x, y, z
+
   PointBuffer points;
+  std::vector<Row> places;  // the same within the cube that Embree knows; no numbers where one is not finite
   std::vector<Index> triangles;
   bool beyond = false;             // a point lies outside of the cube that Embree knows
   RTCGeometry geometry = nullptr;  // the scene's
@@ -121,8 +148,12 @@ struct TriangleTree::Impl {
   // All triangles that may be nearer to the place than the limit, which visit(triangle) gives anew. Squared.
   template <typename Visit>
   void ForNear(Double3 place, double limit, Visit visit) const;
-  // No more than the distance of the place from the box of the triangle's corners; 0 where one of these is no number. Squared.
-  double Apart(Index triangle, Double3 place) const;
+  struct Box {
+    Row lo, hi;
+  };
+  Box BoxOf(Index triangle) const;  // of its finite corners; without any, lo is above hi
+  // No more than the distance of the place, which the margin rounds, from the box of the triangle's finite corners. Squared.
+  float Apart(Index triangle, const Row& place, float margin) const;
   // Its nearest place; none (kNoIndex, infinitely far) beyond the limit. Squared.
   SurfacePoint On(Index triangle, Double3 place, double limit) const;
   void Follow(Line* line, Double3 start, Double3 direction, float near, float far) const;
@@ -134,26 +165,17 @@ struct TriangleTree::Impl {
 // The box of a triangle's finite corners, with a margin of what rounding makes of lines that pass by.
 void TriangleTree::Impl::Bounds(const RTCBoundsFunctionArguments* args) {
   const Impl& tree = *static_cast<const Impl*>(args->geometryUserPtr);
-  const ConstPointsView points = tree.view();
-  float lo[3] = {kFar, kFar, kFar}, hi[3] = {-kFar, -kFar, -kFar}, size = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Index i = tree.triangles[3 * std::size_t{args->primID} + k];
-    const float place[3] = {points.x[i], points.y[i], points.z[i]};
-    if (!std::isfinite(place[0]) || !std::isfinite(place[1]) || !std::isfinite(place[2])) continue;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const float x = std::clamp(place[a], -kFar, kFar);
-      lo[a] = std::min(lo[a], x);
-      hi[a] = std::max(hi[a], x);
-      size = std::max(size, std::fabs(x));
-    }
-  }
+  auto [lo, hi] = tree.BoxOf(args->primID);
   // Without a finite corner it has an empty box, that is in nobody's way; or, since Embree takes none of
   // those when it builds, one that is far away
-  const bool none = lo[0] > hi[0];
-  const float margin = std::max(kLeastMargin, static_cast<float>(kRounding) * size);
-  for (std::size_t a = 0; a < 3; ++a) {
-    lo[a] = none ? kFar : lo[a] - margin;
-    hi[a] = none ? (tree.scene == nullptr ? kFar : -kFar) : hi[a] + margin;
+  if (!(lo[0] <= hi[0])) {
+    lo.fill(kFar), hi.fill(tree.scene == nullptr ? kFar : -kFar);
+  } else {
+    Row size;
+    for (std::size_t k = 0; k < 4; ++k) size[k] = std::max(-lo[k], hi[k]);
+    const float margin =
+        std::max(kLeastMargin, static_cast<float>(kRounding) * std::max({size[0], size[1], size[2]}));
+    for (std::size_t k = 0; k < 4; ++k) lo[k] -= margin, hi[k] += margin;
   }
   *args->bounds_o = {lo[0], lo[1], lo[2], 0, hi[0], hi[1], hi[2], 0};
 }
@@ -168,12 +190,30 @@ void TriangleTree::Impl::Intersect(const RTCIntersectFunctionNArguments* args) {
 }
 
 void TriangleTree::Impl::CopyIn(ConstPointsView from) {
-  const PointsView to = points.view();
-  CopyPoints(from, to);
+  CopyPoints(from, points.view());
+  places.resize(from.count);
   beyond = false;
-  for (const float* row : {to.x, to.y, to.z}) {
-    for (std::size_t i = 0; i < to.count; ++i) beyond |= std::fabs(row[i]) > kFar && std::isfinite(row[i]);
+  for (std::size_t i = 0; i < from.count; ++i) {
+    const float x = from.x[i], y = from.y[i], z = from.z[i];
+    const Row place = {std::clamp(x, -kFar, kFar), std::clamp(y, -kFar, kFar), std::clamp(z, -kFar, kFar), 0};
+    const bool finite = std::isfinite(x) && std::isfinite(y) && std::isfinite(z);
+    places[i] = finite ? place : Row{kNone, kNone, kNone, kNone};
+    beyond |= (std::isfinite(x) && place[0] != x) || (std::isfinite(y) && place[1] != y) ||
+              (std::isfinite(z) && place[2] != z);
   }
+}
+
+TriangleTree::Impl::Box TriangleTree::Impl::BoxOf(Index triangle) const {
+  Box box;
+  box.lo.fill(kFar), box.hi.fill(-kFar);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Row& at = places[triangles[3 * std::size_t{triangle} + k]];
+    for (std::size_t i = 0; i < 4; ++i) {  // what is no number is neither less nor more
+      box.lo[i] = at[i] < box.lo[i] ? at[i] : box.lo[i];
+      box.hi[i] = at[i] > box.hi[i] ? at[i] : box.hi[i];
+    }
+  }
+  return box;
 }
 
 void TriangleTree::Impl::Build() {
@@ -202,18 +242,23 @@ void TriangleTree::Impl::ForNear(Double3 place, double limit, Visit visit) const
   }
   struct Search {
     const Impl* tree;
-    Double3 place;
     Visit visit;
     double limit, rounding, reach = kInfinity;
+    Row row;
+    float margin;
     void SetReach() { reach = std::sqrt(limit) * (1 + kRounding) + rounding; }
     float Radius() const {
       return reach < 4 * double{kFar} ? static_cast<float>(reach) : std::numeric_limits<float>::infinity();
     }
   };
   RTCPointQuery query = {Clamped(place.x), Clamped(place.y), Clamped(place.z), 0, 0};
-  Search search{this, place, visit, limit,
-                kRounding * std::max({std::fabs(query.x), std::fabs(query.y), std::fabs(query.z)})};
-  search.rounding += 1e-18;
+  const float size = std::max({std::fabs(query.x), std::fabs(query.y), std::fabs(query.z)});
+  Search search{.tree = this,
+                .visit = visit,
+                .limit = limit,
+                .rounding = kRounding * double{size} + 1e-18,
+                .row = {query.x, query.y, query.z, 0},
+                .margin = static_cast<float>(kRounding) * size};
   search.SetReach();
   query.radius = search.Radius();
   RTCPointQueryContext context;
@@ -221,7 +266,7 @@ void TriangleTree::Impl::ForNear(Double3 place, double limit, Visit visit) const
   const auto meet = [](RTCPointQueryFunctionArguments* args) {
     auto& at = *static_cast<Search*>(args->userPtr);
     // A leaf holds several triangles, and Embree looks at its box alone
-    if (const double reach = at.reach; at.tree->Apart(args->primID, at.place) > reach * reach) return false;
+    if (at.tree->Apart(args->primID, at.row, at.margin) > at.reach * at.reach) return false;
     const double now = at.visit(args->primID);
     if (!(now < at.limit)) return false;
     at.limit = now;
@@ -232,23 +277,18 @@ void TriangleTree::Impl::ForNear(Double3 place, double limit, Visit visit) const
   rtcPointQuery(scene.get(), &query, &context, meet, &search);
 }
 
-double TriangleTree::Impl::Apart(Index triangle, Double3 place) const {
-  const Index* corner = &triangles[3 * std::size_t{triangle}];
-  const ConstPointsView at = view();
-  double squared = 0;
-  const auto add = [&](const float* row, double x) {
-    const auto a = static_cast<double>(row[corner[0]]), b = static_cast<double>(row[corner[1]]),
-               c = static_cast<double>(row[corner[2]]);
-    // What is no number is neither below nor above
-    const double out = std::max({std::min({a - x, b - x, c - x}), std::min({x - a, x - b, x - c}), 0.0});
-    squared += a + b + c == a + b + c ? out * out : 0;
-  };
-  add(at.x, place.x), add(at.y, place.y), add(at.z, place.z);
-  return squared;
+float TriangleTree::Impl::Apart(Index triangle, const Row& place, float margin) const {
+  const auto [lo, hi] = BoxOf(triangle);
+  Row out;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const float apart = std::max(lo[k] - place[k], place[k] - hi[k]) - margin;
+    out[k] = apart > 0 ? apart * apart : 0;  // what is no number is neither below nor above
+  }
+  return (1 - 2 * static_cast<float>(kRounding)) * (out[0] + out[1] + out[2]);
 }
 
 SurfacePoint TriangleTree::Impl::On(Index triangle, Double3 place, double limit) const {
-  SurfacePoint found = ClosestOnTriangle(view(), &triangles[3 * std::size_t{triangle}], place);
+  SurfacePoint found = ClosestWithin(view(), &triangles[3 * std::size_t{triangle}], place, limit);
   if (!(found.squared <= limit && found.squared < kInfinity)) return {};
   found.triangle = triangle;
   return found;
@@ -308,7 +348,7 @@ SurfacePoint TriangleTree::Closest(Double3 place, double max_distance, Index nea
   const double limit = max_distance * max_distance;
   if (near < impl_->count()) best = impl_->On(near, place, limit);
   impl_->ForNear(place, std::min(limit, best.squared), [&](Index t) {
-    const SurfacePoint found = impl_->On(t, place, limit);
+    const SurfacePoint found = impl_->On(t, place, std::min(limit, best.squared));
     if (Less(found, best)) best = found;
     return best.squared;
   });
@@ -335,7 +375,8 @@ void TriangleTree::ClosestSeveral(Double3 place, std::size_t count, double max_d
   if (impl_ == nullptr || count == 0) return;
   const double limit = max_distance * max_distance;
   impl_->ForNear(place, limit, [&](Index t) {
-    const SurfacePoint one = impl_->On(t, place, limit);
+    const SurfacePoint one =
+        impl_->On(t, place, found->size() < count ? limit : std::min(limit, found->back().squared));
     if (one.triangle != kNoIndex && (found->size() < count || Less(one, found->back()))) {
       if (found->size() == count) found->pop_back();
       found->insert(std::upper_bound(found->begin(), found->end(), one, Less), one);
