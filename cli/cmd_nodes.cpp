@@ -10,6 +10,7 @@
 #include "picture/node_pictures.h"
 #include "report/node_reference.h"
 #include "report/rig_schema.h"
+#include "rig/build/type_names.h"
 
 namespace kpsa::engine {
 namespace {
@@ -45,7 +46,7 @@ CommandResult Nodes(const NodesFlags& flags) {
     const NodeDef* def = registry.Find(*flags.type);
     if (def == nullptr)
       return Status::Usage("no node type is called \"{}\"{}", *flags.type,
-                           DidYouMean(*flags.type, registry.Names()));
+                           SuggestType(*flags.type, registry));
     defs = {def};
   }
   if (flags.json) {

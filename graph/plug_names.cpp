@@ -144,7 +144,10 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool dele
     if (a.per_geometry) {
       plug.element = 0;  // the usual case of one geometry
     } else {
-      return Status::Invalid("{}.{} is an array: name an element, {}[0]", n.name, a.name, a.name);
+      const std::vector<std::string>* names = ElementNames(id, plug.attribute);
+      const bool named = names != nullptr && !names->empty();
+      return Status::Invalid("{}.{} is an array: name an element, {}[{}]{}", n.name, a.name, a.name,
+                             named ? names->front() : "0", named ? NearOrAll("", {}, *names) : Suggestion());
     }
   }
   KPSA_RETURN_IF_ERROR(CheckPlug(plug));

@@ -8,6 +8,9 @@ namespace kpsa::engine {
 
 RigNames::RigNames(const RigFile& file, const Rig& rig, YamlErrors* errors) : rig_(rig), errors_(errors) {
   for (std::size_t n = 0; n < file.nodes.size(); ++n) written_.emplace(file.nodes[n].name, n);
+  for (const RigDeform& deform : file.deform) {
+    for (const RigString& item : deform.stack) in_stacks_.insert(item.text);
+  }
   for (Index i = 0; i < rig.character->nodes.size(); ++i) {
     const std::string& name = rig.character->nodes[i].name;
     gltf_by_name_[name.empty() ? fmt::format("node{}", i) : name].push_back(i);
@@ -98,6 +101,8 @@ const Stage* RigNames::FindStage(const CharacterMesh& mesh, const std::string& s
                                  const SourceLocation& where) const {
   const Stage* found = mesh.FindStage(stage);
   if (found != nullptr) return found;
+  // Another error says why that stack was not made
+  if (!errors_->ok() && IsWritten(stage) && in_stacks_.count(stage) != 0) return nullptr;
   std::vector<std::string> names;
   for (const Stage& s : mesh.stages) names.push_back(s.name);
   Fail(where, Status::Invalid("\"{}\" has no stage \"{}\"{}; its stack is {}", mesh.name, stage,

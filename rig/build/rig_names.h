@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "rig/build/rig_builder.h"
@@ -30,6 +31,7 @@ class RigNames {
   // MESH@STAGE. Stages may have an @ in their names, too: the longest mesh that exists wins. Without a mesh that
   // exists, the text up to its last @; without an @, all of it is the mesh.
   void SplitStage(const std::string& text, std::string* mesh, std::string* stage) const;
+  // No error where a stack lists that node, and another error says why it could not be made.
   const Stage* FindStage(const CharacterMesh& mesh, const std::string& stage,
                          const SourceLocation& where) const;
 
@@ -39,6 +41,7 @@ class RigNames {
   const Rig& rig_;
   YamlErrors* errors_;
   std::unordered_map<std::string, std::size_t> written_;
+  std::unordered_set<std::string> in_stacks_;                         // what stacks list
   std::unordered_map<std::string, std::vector<Index>> gltf_by_name_;  // verbatim names
   std::unordered_map<Index, Index> gltf_by_node_;
 };

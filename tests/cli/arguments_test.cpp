@@ -116,6 +116,7 @@ TEST(Arguments, UsageMistakes) {
       {{"compare", "taken.npz", "taken.npz"}, 3, "taken.npz"},
       {{"compare", "a.npz", "b.npz", "--tolerance", "-1"}, 2, "--tolerance"},
       {{"nodes", "deltaMsh"}, 2, "did you mean \"deltaMush\""},
+      {{"nodes", "nonLinear"}, 2, "bend, flare, sine, squash, twist or wave"},
       {{"inspect", "a.txt"}, 2, ".glb"},
       {{"inspect", "none.npz"}, 3, "none.npz"},
       {{"inspect", "head.json"}, 3, "head.json"},

@@ -176,6 +176,22 @@ TEST_F(BadRigs, BomAndCarriageReturnsAreFine) {
                 {"bad.yaml:4:13: unknown node type \"deltaMsuh\" (did you mean \"deltaMush\"?)"});
 }
 
+TEST_F(BadRigs, WhatOnlyFollowsFromAnErrorIsNotTold) {
+  const std::string rest =
+      "deform: [{meshes: [body], stack: [gltf, mush]}]\naccelerate: {a: {points: [body@mush]}}\n";
+  folder.Write("bad.yaml", "kpsa: 1\ncharacter: c.gltf\nnodes:\n  mush: {type: deltaMsuh}\n" + rest);
+  const ProcessResult run = RunKpsa({"validate", "bad.yaml"}, kMostSeconds, folder.path());
+  EXPECT_NE(run.err.find("bad.yaml:4:16: unknown node type"), std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("has no stage"), std::string::npos) << run.err;
+  ExpectBad("nodes: {mush: {type: deltaMush}}\naccelerate: {a: {points: [body@mush]}}\n",
+            {"has no stage \"mush\""});
+}
+
+TEST_F(BadRigs, TypesOfOtherPrograms) {
+  ExpectBad("nodes: {a: {type: correctiveSmooth}}\n",
+            {"unknown node type \"correctiveSmooth\"; what other programs call so is deltaMush here"});
+}
+
 TEST_F(BadRigs, Values) {
   ExpectBad("nodes: {a: {type: deltaMush, envelope: .nan}}\n", {"t.yaml:3:40: ", "a.envelope", "not finite"});
   ExpectBad("nodes: {a: {type: deltaMush, envelope: 1e999}}\n", {"t.yaml:3:40: ", "outside of the range"});

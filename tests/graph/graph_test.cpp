@@ -237,7 +237,8 @@ TEST_F(GraphTest, PlugsByName) {
   EXPECT_TRUE(Says(NameOf("flat.points[0,2,0]"), "divisions takes three numbers, not 2"));
   EXPECT_TRUE(Says(NameOf("Cage 1.points[99999999999999999999]"), "expected an index from 0"));
   EXPECT_EQ(NameOf("Cage 1.pivot.z"), "Cage 1.center.z");
-  EXPECT_EQ(NameOf("Cage 1.weight"), "Cage 1.weight is an array: name an element, weight[0]");
+  EXPECT_EQ(NameOf("Cage 1.weight"),
+            "Cage 1.weight is an array: name an element, weight[smile]; there is smile, jaw.open, brow up");
   EXPECT_EQ(NameOf("Cage 1.size[0]"), "Cage 1.size is no array");
   EXPECT_TRUE(Says(NameOf("Cage 1.points[1"), "[ without ]"));
   EXPECT_TRUE(Says(NameOf("Cage 1.center.q"), "expected .x, .y or .z"));

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "rig/build/type_names.h"
+
 namespace kpsa::engine {
 namespace {
 
@@ -21,7 +23,7 @@ void AddNodes(const BuildInput& in, MadeNodes* nodes, std::map<std::string, Sour
     }
     if (graph->registry().Find(node.type) == nullptr) {
       in.errors->Add(node.type_node, "unknown node type \"{}\"{}", node.type,
-                     DidYouMean(node.type, graph->registry().Names()));
+                     SuggestType(node.type, graph->registry()));
       continue;
     }
     Result<NodeId> id = graph->AddNode(node.type, node.name);

@@ -1,0 +1,15 @@
+// What other programs call the node types of this one.
+#pragma once
+
+#include <string_view>
+
+#include "base/status.h"
+#include "graph/node_registry.h"
+
+namespace kpsa::engine {
+
+// For a message about a type that the registry has not: those with a name like it, or what stands here for a node, modifier,
+// constraint or operator of that name in Maya, Blender, Houdini or Unreal.
+Suggestion SuggestType(std::string_view type, const NodeRegistry& registry);
+
+}  // namespace kpsa::engine
