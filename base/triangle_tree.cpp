@@ -16,8 +16,9 @@ constexpr std::size_t kFew = 8;  // triangles: they are looked at one by one
 constexpr float kFar = 1e18f;    // Embree takes no larger coordinates
 // What rounding to floats may do, on Embree's side too, of the largest coordinate: 16 steps
 constexpr double kRounding = 2e-6;
-// What rounding leaves certain, of squares; and of triangles of which it leaves that, the sine of an angle
-constexpr double kClearly = 1e-9, kSlender = 1e-9;
+// Where a triangle is clearly farther off than a place that is known, of squared distances: so much more, and so much of its
+// own size and distance; and the squared sine of an angle that is wide enough to tell
+constexpr double kClearly = 1e-9, kRounded = 1e-20, kSlender = 1e-9;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kLeastMargin = 1e-30f;  // Embree may take smaller numbers for 0
 
@@ -107,12 +108,13 @@ SurfacePoint ClosestWithin(ConstPointsView points, const Index corners[3], Doubl
     }
     // The nearest place lies on a side that the place is outside of
     const double length[3] = {Dot(side[0], side[0]), Dot(side[1], side[1]), Dot(side[2], side[2])},
-                 height = Dot(normal, place - a), slender = kSlender * length[0] * length[2];
+                 height = Dot(normal, place - a), slender = kSlender * length[0] * length[2],
+                 rounded = kRounded * (Dot(place - a, place - a) + length[0] + length[2]);
     for (int k = 0; k < 3 && square > slender; ++k) {
       const double across = inside[k] * inside[k], scale = square * length[k];
       if (inside[k] > 0) {
-        asked[k] = !(across > kClearly * scale * length[k]);
-      } else if (height * height * length[k] + across > (1 + kClearly) * bound * scale) {
+        asked[k] = !(across > (kClearly * length[k] + rounded) * scale);
+      } else if (height * height * length[k] + across > ((1 + kClearly) * bound + rounded) * scale) {
         return best;
       }
     }

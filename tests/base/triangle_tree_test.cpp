@@ -165,6 +165,46 @@ TEST(TriangleTree, TiesGoToTheLowerTriangle) {
   EXPECT_EQ(edge.triangle, 20u);
 }
 
+// On edges, on corners, and beside them by less and less: which triangles are equally near rounding must not say.
+TEST(TriangleTree, TiesOnTheSurfaceGoToTheLowerTriangle) {
+  constexpr Index kSide = 12;
+  Places random(7);
+  std::vector<float> xyz;
+  for (Index i = 0; i < kSide * kSide; ++i) {
+    for (const double c :
+         {i % kSide + 0.3 * random.Signed(), i / kSide + 0.3 * random.Signed(), 0.4 * random.Signed()})
+      xyz.push_back(static_cast<float>(0.01 * c));
+  }
+  std::vector<Index> triangles;
+  for (Index i = 0; i + 1 < kSide; ++i) {
+    for (Index j = 0; j + 1 < kSide; ++j) {
+      const Index a = i * kSide + j, b = a + 1, c = a + kSide, d = c + 1;
+      triangles.insert(triangles.end(), {a, b, c, c, b, d});
+    }
+  }
+  const Soup soup(xyz, triangles);
+  for (Index t = 0; t < triangles.size() / 3; ++t) {
+    const auto corner = [&](Index k) {
+      const Index i = triangles[3 * t + k % 3];
+      return Double3{soup.view().x[i], soup.view().y[i], soup.view().z[i]};
+    };
+    for (Index k = 0; k < 3; ++k) {
+      const double share = k == 0 ? 0 : 0.5 + 0.4 * random.Signed();
+      const Double3 at = corner(k) * (1 - share) + corner(k + 1) * share;
+      for (const double away : {0.0, 1e-22, 1e-19, 1e-17, 1e-15, 1e-13, 1e-10}) {
+        const Double3 place = at + random.Vector() * away;
+        const SurfacePoint all = ByHand(soup, place);
+        for (Index near = t < 30 ? 0 : t - 30; near < std::min<std::size_t>(t + 30, triangles.size() / 3);
+             ++near) {
+          const SurfacePoint found = soup.tree.Closest(place, kInfinity, near);
+          ASSERT_EQ(found.triangle, all.triangle) << t << " " << k << " " << away << ", from " << near;
+          ASSERT_EQ(found.squared, all.squared);
+        }
+      }
+    }
+  }
+}
+
 TEST(TriangleTree, RefittedBoxesFindMovedTriangles) {
   Soup soup = RandomSoup(200, 9);
   Places random(10);
@@ -354,7 +394,7 @@ TEST(TriangleTree, LooksAtFewTriangles) {
       const float before = soup.points.view().x[200];
       soup.points.view().x[200] = far;
       soup.Move();
-      EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", " << far;
+      EXPECT_LT(*count(query, place, way), 2 * *usual + 5000) << query << ", " << far;
       soup.points.view().x[200] = before;
       soup.Move();
     }
@@ -364,7 +404,7 @@ TEST(TriangleTree, LooksAtFewTriangles) {
       for (const Index corner : {i, i + 1, i + kSide, i + kSide + 1}) soup.points.view().y[corner] = kNan;
     }
     soup.Move();
-    EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", lost squares";
+    EXPECT_LT(*count(query, place, way), 2 * *usual + 5000) << query << ", lost squares";
     soup.points = whole;
     soup.Move();
     for (const double bad : {kInfinity, static_cast<double>(kNan)}) {
