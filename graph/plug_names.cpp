@@ -173,7 +173,8 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
     if (!same.empty())
       return Status::Invalid("{}.{} has several elements \"{}\": {}", n.name, a.name, text,
                              fmt::join(same, ", "));
-    return Status::Invalid("{}.{} has no element \"{}\"{}", n.name, a.name, text, DidYouMean(text, names));
+    return Status::Invalid("{}.{} has no element \"{}\"{}", n.name, a.name, text,
+                           NearOrAll(text, names, names));
   }
   if (!a.grid.empty() && text.find(',') != std::string_view::npos) {
     const int divisions_attribute = n.def->FindAttribute(a.grid);

@@ -227,7 +227,8 @@ TEST_F(GraphTest, PlugsByName) {
   EXPECT_EQ(NameOf("Cage 1.weight[jaw.open]"), "Cage 1.weight[jaw.open]");
   EXPECT_EQ(NameOf("Cage 1.weight[2]"), "Cage 1.weight[brow up]");
   EXPECT_EQ(NameOf("Cage 1.weight[smil]"), "Cage 1.weight has no element \"smil\" (did you mean \"smile\"?)");
-  EXPECT_EQ(NameOf("Cage 1.weight[3]"), "Cage 1.weight has no element \"3\"");
+  EXPECT_EQ(NameOf("Cage 1.weight[3]"),
+            "Cage 1.weight has no element \"3\"; there is smile, jaw.open, brow up");
   EXPECT_EQ(NameOf("Cage 1.points[1,2,1]"), "Cage 1.points[11]");  // s fastest
   EXPECT_EQ(NameOf("Cage 1.points[1,0,0].y"), "Cage 1.points[1].y");
   EXPECT_TRUE(Says(NameOf("Cage 1.points[1,3,0]"), "expected three indices within the divisions [2, 3, 2]"));
