@@ -246,7 +246,7 @@ void TriangleTree::Impl::ForNear(Double3 place, double limit, Visit visit) const
     const Impl* tree;
     Visit visit;
     double limit, rounding, reach = kInfinity;
-    Row row;
+    Row row;  // the place in floats, and what that may be off by
     float margin;
     void SetReach() { reach = std::sqrt(limit) * (1 + kRounding) + rounding; }
     float Radius() const {
@@ -377,8 +377,7 @@ void TriangleTree::ClosestSeveral(Double3 place, std::size_t count, double max_d
   if (impl_ == nullptr || count == 0) return;
   const double limit = max_distance * max_distance;
   impl_->ForNear(place, limit, [&](Index t) {
-    const SurfacePoint one =
-        impl_->On(t, place, found->size() < count ? limit : std::min(limit, found->back().squared));
+    const SurfacePoint one = impl_->On(t, place, found->size() < count ? limit : found->back().squared);
     if (one.triangle != kNoIndex && (found->size() < count || Less(one, found->back()))) {
       if (found->size() == count) found->pop_back();
       found->insert(std::upper_bound(found->begin(), found->end(), one, Less), one);

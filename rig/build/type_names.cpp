@@ -7,20 +7,13 @@
 namespace kpsa::engine {
 namespace {
 
-// Names in small letters, without what stands between their words.
-struct OtherName {
-  std::string_view name, here;
-};
-constexpr OtherName kOtherNames[] = {
+constexpr OtherTypeName kOtherNames[] = {
     // Maya
     {"nonlinear", "bend, flare, sine, squash, twist or wave"},
     {"ffd", "lattice"},
     {"basemesh", "mesh"},
-    {"texturedeformer", "sculpt"},
     {"proximitypin", "uvPin"},
     {"pointonpolyconstraint", "uvPin"},
-    {"geometryconstraint", "shrinkWrap or uvPin"},
-    {"normalconstraint", "uvPin or follicle"},
     {"iksplinehandle", "splineIk"},
     {"nurbscurve", "curve"},
     {"aimmatrix", "aimConstraint"},
@@ -28,7 +21,7 @@ constexpr OtherName kOtherNames[] = {
     {"pairblend", "blendMatrix"},
     {"multdoublelinear", "multiplyDivide"},
     {"adddoublelinear", "plusMinusAverage"},
-    {"reverse", "plusMinusAverage (operation: subtract) or expression"},
+    {"reverse", "plusMinusAverage or expression"},
     {"floatmath", "expression"},
     {"weightdriver", "poseInterpolator"},
     // Blender
@@ -75,8 +68,10 @@ std::string Plain(std::string_view name) {
 
 }  // namespace
 
+std::span<const OtherTypeName> OtherTypeNames() { return kOtherNames; }
+
 Suggestion SuggestType(std::string_view type, const NodeRegistry& registry) {
-  const auto other = std::ranges::find(kOtherNames, Plain(type), &OtherName::name);
+  const auto other = std::ranges::find(kOtherNames, Plain(type), &OtherTypeName::name);
   if (other != std::end(kOtherNames))
     return {"", "; what other programs call so is " + std::string(other->here) + " here"};
   return DidYouMean(type, registry.Names());

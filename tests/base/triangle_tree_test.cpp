@@ -394,7 +394,7 @@ TEST(TriangleTree, LooksAtFewTriangles) {
       const float before = soup.points.view().x[200];
       soup.points.view().x[200] = far;
       soup.Move();
-      EXPECT_LT(*count(query, place, way), 2 * *usual + 5000) << query << ", " << far;
+      EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", " << far;
       soup.points.view().x[200] = before;
       soup.Move();
     }
@@ -404,7 +404,7 @@ TEST(TriangleTree, LooksAtFewTriangles) {
       for (const Index corner : {i, i + 1, i + kSide, i + kSide + 1}) soup.points.view().y[corner] = kNan;
     }
     soup.Move();
-    EXPECT_LT(*count(query, place, way), 2 * *usual + 5000) << query << ", lost squares";
+    EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", lost squares";
     soup.points = whole;
     soup.Move();
     for (const double bad : {kInfinity, static_cast<double>(kNan)}) {

@@ -17,7 +17,8 @@ struct ProcessResult {
   std::size_t error_lines() const;
 };
 
-// limit_seconds: of processor time, or twenty times as long by the clock. Without a terminal; `environment` entries ("NO_COLOR=1") are added to the test's.
+// limit_seconds: of processor time, or twenty times as long by the clock. Without a terminal; `environment` entries
+// ("NO_COLOR=1") are added to the test's.
 ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds = 60,
                       const std::string& folder = "", const std::vector<std::string>& environment = {});
 // A line of shell, as /bin/sh runs it in the folder; its processor time is not that of what it starts.

@@ -36,41 +36,9 @@ TEST_F(TypeNames, ThatAreNearAreSuggested) {
 // What is suggested exists, and no name of ours is taken for another program's.
 TEST_F(TypeNames, LeadToTypesThatExist) {
   const std::regex words("[A-Za-z]+");
-  for (const char* name : {"nonLinear",
-                           "ffd",
-                           "baseMesh",
-                           "textureDeformer",
-                           "proximityPin",
-                           "geometryConstraint",
-                           "ikSplineHandle",
-                           "nurbsCurve",
-                           "wtAddMatrix",
-                           "pairBlend",
-                           "addDoubleLinear",
-                           "multDoubleLinear",
-                           "weightDriver",
-                           "Armature",
-                           "Shape Keys",
-                           "Surface Deform",
-                           "Hook",
-                           "Simple Deform",
-                           "Copy Rotation",
-                           "Copy Location",
-                           "Copy Scale",
-                           "Child Of",
-                           "Damped Track",
-                           "Empty",
-                           "Bone",
-                           "bonedeform",
-                           "pointdeform",
-                           "softTransform",
-                           "null",
-                           "poseDriver",
-                           "Morph Target"}) {
-    const std::string said = Suggest(name), begin = "; what other programs call so is ";
-    ASSERT_TRUE(said.starts_with(begin)) << name << said;
-    const std::string types =
-        said.substr(begin.size(), said.size() - begin.size() - std::string(" here").size());
+  for (const auto& [name, here] : OtherTypeNames()) {
+    EXPECT_EQ(Suggest(name), fmt::format("; what other programs call so is {} here", here));
+    const std::string types(here);
     for (std::sregex_iterator word(types.begin(), types.end(), words), end; word != end; ++word) {
       if (word->str() == "or") continue;
       EXPECT_NE(registry_.Find(word->str()), nullptr) << name << ": " << word->str();
