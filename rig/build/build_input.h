@@ -26,6 +26,11 @@ struct BuildInput {
     errors->Append(std::move(status).At(where));
     return false;
   }
+  // The same of a plug that a file names; no second error where its node could not be made.
+  bool FailPlug(const SourceLocation& where, const std::string& plug, Status status) const {
+    if (!status.ok() && names.LacksNodeOf(plug)) return false;
+    return Fail(where, std::move(status));
+  }
 };
 
 }  // namespace kpsa::engine

@@ -24,6 +24,15 @@ bool RigNames::Fail(const SourceLocation& where, Status status) const {
   return false;
 }
 
+bool RigNames::LacksNodeOf(const std::string& plug) const {
+  if (errors_->ok()) return false;
+  for (std::size_t dot = plug.find('.'); dot != std::string::npos; dot = plug.find('.', dot + 1)) {
+    const std::string node = plug.substr(0, dot);
+    if (IsWritten(node) && !rig_.graph->FindNode(node).ok()) return true;
+  }
+  return false;
+}
+
 Index RigNames::GltfNode(NodeId node) const {
   const auto it = gltf_by_node_.find(node.index);
   return it == gltf_by_node_.end() ? kNoIndex : it->second;

@@ -21,6 +21,8 @@ class RigNames {
   // Nodes of the file, whether they could be made or not.
   bool IsWritten(const std::string& name) const { return written_.count(name) != 0; }
   std::size_t Written(const std::string& name) const { return written_.at(name); }  // in RigFile::nodes
+  // Whether it is of a node of the file that could not be made, which another error says.
+  bool LacksNodeOf(const std::string& plug) const;
   // The glTF node that a node of the graph stands for; kNoIndex for others.
   Index GltfNode(NodeId node) const;
 

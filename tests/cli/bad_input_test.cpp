@@ -183,6 +183,15 @@ TEST_F(BadRigs, WhatOnlyFollowsFromAnErrorIsNotTold) {
   const ProcessResult run = RunKpsa({"validate", "bad.yaml"}, kMostSeconds, folder.path());
   EXPECT_NE(run.err.find("bad.yaml:4:16: unknown node type"), std::string::npos) << run.err;
   EXPECT_EQ(run.err.find("has no stage"), std::string::npos) << run.err;
+  folder.Write(
+      "bad.yaml",
+      "kpsa: 1\ncharacter: c.gltf\nnodes: {a: {type: choise}, b: {type: transform}}\n"
+      "connections: [a.output -> b.translateX, b.translateY -> a.selector, a.output -> c.translateX]\n"
+      "controls: {a.selector: {min: 0, max: 1}}\n");
+  const ProcessResult plugs = RunKpsa({"validate", "bad.yaml"}, kMostSeconds, folder.path());
+  EXPECT_NE(plugs.err.find("unknown node type \"choise\""), std::string::npos) << plugs.err;
+  EXPECT_NE(plugs.err.find("unknown node \"c\""), std::string::npos) << plugs.err;
+  EXPECT_EQ(plugs.err.find("unknown node \"a\""), std::string::npos) << plugs.err;
   ExpectBad("nodes: {mush: {type: deltaMush}}\naccelerate: {a: {points: [body@mush]}}\n",
             {"has no stage \"mush\""});
 }

@@ -13,7 +13,7 @@ void AddControls(const BuildInput& in, std::vector<Control>* controls) {
   for (const RigControl& from : in.file.controls) {
     if (in.errors->full()) return;
     const Result<PlugRef> plug = in.graph().FindPlug(from.plug.text);
-    if (!in.Fail(from.plug.where, plug.status())) continue;
+    if (!in.FailPlug(from.plug.where, from.plug.text, plug.status())) continue;
     const AttributeDef& attribute =
         in.graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
     const Type type = in.graph().PlugType(*plug);

@@ -17,7 +17,7 @@ void CheckVariants(const BuildInput& in, const MadeNodes& nodes) {
       const bool written = dot != std::string::npos && node.ok() &&
                            (nodes.Find(*node) != nullptr || ReferenceOf(in.rig, *node) != nullptr);
       if (!written || !IsRigWord(in.graph().def(*node), text.substr(dot + 1)))
-        in.Fail(override_.plug.where, plug.status());
+        in.FailPlug(override_.plug.where, text, plug.status());
     }
   }
 }

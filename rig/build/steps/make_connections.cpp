@@ -20,7 +20,7 @@ class Connections {
       if (in_.errors->full()) return;
       const Result<PlugRef> from = graph_->FindPlug(wanted.from);
       if (!from.ok()) {
-        in_.Fail(wanted.where, from.status());
+        in_.FailPlug(wanted.where, wanted.from, from.status());
         continue;
       }
       if (!wanted.overrides) ConnectUnlessOverridden(*from, wanted.to, wanted.where, wanted.source, false);
@@ -30,8 +30,8 @@ class Connections {
       if (in_.errors->full()) return;
       const Result<PlugRef> from = graph_->FindPlug(connection.from);
       const Result<PlugRef> to = graph_->FindPlug(connection.to);
-      const bool good = in_.Fail(connection.where, from.status());
-      if (!in_.Fail(connection.where, to.status()) || !good) continue;
+      const bool good = in_.FailPlug(connection.where, connection.from, from.status());
+      if (!in_.FailPlug(connection.where, connection.to, to.status()) || !good) continue;
       if (ReferenceOf(in_.rig, to->node) != nullptr) {
         const auto [it, added] = across.emplace(KeyOf(*to), connection.where);
         if (!added) {

@@ -18,7 +18,7 @@ void ReadOverride(const BuildInput& in, const RigOverride& override_, PlugReader
   // A list for a whole array: its elements, and no others
   const Result<PlugRef> first = graph->FindPlug(override_.plug.text + "[0]");
   if (!first.ok() || !AttributeOf(*graph, *first).array || !override_.value.is_sequence()) {
-    in.Fail(override_.plug.where, plug.status());
+    in.FailPlug(override_.plug.where, override_.plug.text, plug.status());
     return;
   }
   PlugRef element = *first;
