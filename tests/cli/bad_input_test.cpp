@@ -210,6 +210,8 @@ TEST_F(BadRigs, Values) {
             {"t.yaml:3:42: ", "expected a number, found a list"});
   ExpectBad("nodes: {a: {type: deltaMush, iterations: 2.5}}\n", {"t.yaml:3:42: ", "whole number"});
   ExpectBad("nodes: {a: {type: deltaMush, iterations: {}}}\n", {"t.yaml:3:42: "});
+  ExpectBad("nodes: {a: {type: deltaMush, iterations: ten}}\n",
+            {"t.yaml:3:42: ", "a.iterations: \"ten\" is neither a value of it nor a plug, node.attribute"});
   ExpectBad("nodes: {a: {type: transform, translate: [1, 2]}}\n", {"t.yaml:3:41: ", "3 numbers, found 2"});
   ExpectBad("controls: {tip.rotateX: {min: 3, max: -25}}\n", {"t.yaml:3:31: ", "min 3 is above max -25"});
   for (const char* tolerance : {"0", "-1mm", "0mm"}) {

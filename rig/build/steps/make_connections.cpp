@@ -20,7 +20,12 @@ class Connections {
       if (in_.errors->full()) return;
       const Result<PlugRef> from = graph_->FindPlug(wanted.from);
       if (!from.ok()) {
-        in_.FailPlug(wanted.where, wanted.from, from.status());
+        // A word in the place of a value was perhaps meant as one
+        const bool word = wanted.from.find('.') == std::string::npos;
+        in_.FailPlug(wanted.where, wanted.from,
+                     word ? Status::Invalid("{}: \"{}\" is neither a value of it nor a plug, node.attribute",
+                                            graph_->PlugName(wanted.to), wanted.from)
+                          : from.status());
         continue;
       }
       if (!wanted.overrides) ConnectUnlessOverridden(*from, wanted.to, wanted.where, wanted.source, false);
