@@ -15,16 +15,17 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kFewestPoses = 200;  // that points are judged by; a third of them of the clips
+constexpr std::size_t kFoldedPoses = 200;  // besides
 constexpr std::size_t kMostBytes = std::size_t{320} << 20;      // of these, at a time
 constexpr std::size_t kMostMendedPoints = 8, kAPointOf = 2000;  // one of so many, where that is more
-// Tolerances: points that are farther off in frames of the clips are mended, or without clips in other poses, which count
-// half: what these do far out, clips hardly ever do
+// Tolerances: points that are farther off in frames of the clips or in folded poses are mended, or without clips in drawn
+// ones; all but clips count half: what they do far out, clips hardly ever do
 constexpr double kOff = 0.5, kOfSamples = 0.5;
 constexpr double kBetter = 0.7;                   // of what they were off, in poses that were not fitted to
 constexpr std::size_t kHeldOut = 4;               // of so many poses, one
 constexpr double kRidges[] = {1e-7, 1e-5, 1e-3};  // of the variance of a cue
 
-// Poses that points are judged by, those of the clips first: evaluated a few at a time.
+// Poses that points are judged by, those of the clips first, the folded ones last: evaluated a few at a time.
 class MendPoses {
  public:
   explicit MendPoses(TrainingSetup* setup) : setup_(setup) {
@@ -41,9 +42,14 @@ class MendPoses {
                            setup->options.seed ^ 0x3c6ef372fe94f82bull);
     std::ranges::stable_sort(sampled, {}, &SampledPose::clip);
     for (const SampledPose& pose : sampled) poses_.push_back(RecordedOf(pose, setup->clips));
+    folded_begin_ = poses_.size();
+    for (const SampledPose& pose :
+         setup->sampler->Folded(kFoldedPoses, setup->options.seed ^ 0x9b05688c2b3e6c1full))
+      poses_.push_back(RecordedOf(pose, setup->clips));
   }
   std::size_t size() const { return poses_.size(); }
   std::size_t of_clips() const { return of_clips_; }
+  std::size_t folded_begin() const { return folded_begin_; }
 
   // Rows of some recorders, each of the same poses; `use` gets them with the number of their first pose.
   Status Record(std::span<PoseRecorder* const> recorders,
@@ -69,7 +75,7 @@ class MendPoses {
  private:
   TrainingSetup* setup_;
   std::vector<RecordedPose> poses_;
-  std::size_t of_clips_ = 0;
+  std::size_t of_clips_ = 0, folded_begin_ = 0;
 };
 
 // Some points in all of these poses.
@@ -102,13 +108,16 @@ struct Points {
   SomePoints out, inner;  // as they come out, and before the last steps; of all meshes
 };
 
-// How far off each point is, worst pose of the clips first, then of the others.
+// How far off each point is, in the worst pose of the clips, of the drawn ones, and of the folded ones.
 struct Off {
-  std::vector<float> clips, samples;
+  std::vector<float> clips, samples, folded;
   bool has_clips = false;
-  Off(std::size_t points, bool of_clips) : clips(points, 0), samples(points, 0), has_clips(of_clips) {}
+  Off(std::size_t points, bool of_clips)
+      : clips(points, 0), samples(points, 0), folded(points, 0), has_clips(of_clips) {}
   double of(std::size_t point) const {
-    return has_clips ? static_cast<double>(clips[point]) : kOfSamples * static_cast<double>(samples[point]);
+    const double other = kOfSamples * static_cast<double>(folded[point]);
+    return std::max(other, has_clips ? static_cast<double>(clips[point])
+                                     : kOfSamples * static_cast<double>(samples[point]));
   }
 };
 
@@ -122,8 +131,8 @@ Double3 At(std::span<const float> row, std::size_t i) {
 }
 
 // y of the poses from `first_pose` on, and how far off each point of all outputs is.
-void Judge(const Subspace& subspace, const CueSet& cues, const PoseMatrix& rows, std::size_t first_pose,
-           std::size_t of_clips, Eigen::MatrixXf* y, Off* off) {
+void Judge(const Subspace& subspace, const CueSet& cues, const MendPoses& poses, const PoseMatrix& rows,
+           std::size_t first_pose, Eigen::MatrixXf* y, Off* off) {
   const PoseLayout& layout = rows.layout();
   std::mutex mutex;
   ParallelFor(rows.poses(), 16, [&](std::size_t begin, std::size_t end) {
@@ -131,7 +140,7 @@ void Judge(const Subspace& subspace, const CueSet& cues, const PoseMatrix& rows,
     std::vector<double> raw(subspace.rows());
     std::vector<PointBuffer> buffers;
     for (const SubspaceOutput& output : subspace.outputs) buffers.emplace_back(output.points);
-    Off own(layout.points, of_clips > 0);
+    Off own(layout.points, off->has_clips);
     for (std::size_t t = begin; t < end; ++t) {
       const std::span<const float> row = rows.row(t);
       CueReader reader(layout, row, nullptr);
@@ -147,7 +156,10 @@ void Judge(const Subspace& subspace, const CueSet& cues, const PoseMatrix& rows,
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         subspace.tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
         const ConstPointsView made = std::as_const(buffers[m]).view();
-        std::vector<float>& worst = first_pose + t < of_clips ? own.clips : own.samples;
+        const std::size_t pose = first_pose + t;
+        std::vector<float>& worst = pose < poses.of_clips()       ? own.clips
+                                    : pose < poses.folded_begin() ? own.samples
+                                                                  : own.folded;
         for (std::size_t i = 0; i < made.count; ++i) {
           const auto error = static_cast<float>(Length(At(made, i) - At(row, first + i)));
           worst[first + i] = std::max(worst[first + i], error);
@@ -159,6 +171,7 @@ void Judge(const Subspace& subspace, const CueSet& cues, const PoseMatrix& rows,
     for (std::size_t i = 0; i < layout.points; ++i) {
       off->clips[i] = std::max(off->clips[i], own.clips[i]);
       off->samples[i] = std::max(off->samples[i], own.samples[i]);
+      off->folded[i] = std::max(off->folded[i], own.folded[i]);
     }
   });
 }
@@ -283,7 +296,7 @@ Status MendTiles(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>&
   Off off(setup->layout.points, poses.of_clips() > 0);
   PoseRecorder* const of_all[] = {setup->recorder.get()};
   KPSA_RETURN_IF_ERROR(poses.Record(of_all, [&](std::size_t first, std::span<const PoseMatrix> rows) {
-    Judge(*subspace, cues, rows[0], first, poses.of_clips(), &y, &off);
+    Judge(*subspace, cues, poses, rows[0], first, &y, &off);
   }));
 
   // What is farthest off, by tile, and what that takes

@@ -91,20 +91,32 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
   const double ns = *points + setup->CostOfSteps() + candidates.cost.ns;
   trained.subspace = std::move(subspace), trained.record = std::move(record);
   trained.ns = ns, trained.full_ns = setup->full_cost, trained.seconds = limit.elapsed();
+  trained.wrong = candidates.cost.wrong;
   trained.lost = candidates.cost.lost(), trained.lost_of_clips = candidates.cost.lost_of_clips;
   return trained;
 }
 
-// The points of these rows, as far as they come out, and those that go through a step already; by mesh.
-std::vector<std::vector<Index>> WithStepped(const TrainingSetup& setup, std::span<const std::size_t> rows) {
+// The points of these rows, by mesh, as far as they come out.
+std::vector<std::vector<Index>> PointsOfRows(const TrainingSetup& setup, std::span<const std::size_t> rows) {
   std::vector<std::vector<Index>> of_meshes(setup.totals.size());
-  for (std::size_t m = 0; m < setup.rig.stepped.size(); ++m) of_meshes[m] = setup.rig.stepped[m].points;
   for (const std::size_t row : rows) {
     if (const auto found = setup.PointThatComesOut(row); found)
       of_meshes[found->first].push_back(found->second);
   }
   for (std::vector<Index>& points : of_meshes) std::ranges::sort(points);
   return of_meshes;
+}
+
+// And those that go through a step already.
+void TellPoor(const TrainingSetup& setup, const Poor& poor, Trained* trained) {
+  trained->poor = PointsOfRows(setup, poor.points);
+  for (std::size_t m = 0; m < setup.rig.stepped.size(); ++m) {
+    const std::vector<Index>& already = setup.rig.stepped[m].points;
+    std::vector<Index>& points = trained->poor[m];
+    points.insert(points.end(), already.begin(), already.end());
+    std::ranges::sort(points);
+  }
+  trained->turned = PointsOfRows(setup, poor.turned);
 }
 
 // Of all meshes, where these have a step. cost: of a frame without them.
@@ -123,9 +135,10 @@ TileSteps StepsOfTiles(const TrainingSetup& setup, const std::vector<Compiler::S
 
 // It ends with points that are to blame, before anything else was looked for: others are taken that cost less than what is
 // cheap.
-Trained EndedEarly(const TrainingSetup& setup, std::span<const std::size_t> poor) {
+Trained EndedEarly(const TrainingSetup& setup, const Poor& poor) {
   Trained trained;
-  trained.ended = true, trained.poor = WithStepped(setup, poor);
+  trained.ended = true;
+  TellPoor(setup, poor, &trained);
   trained.held = setup.sampler->held();
   trained.ns = kCheapPoints * setup.full_cost / (kOfExpected * kAlikeOfMany);
   trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
@@ -220,7 +233,8 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     if (!*best) {
       if (candidates.by_tiles_alone() && !candidates.poor.empty()) {
         Trained trained;
-        trained.ended = true, trained.poor = WithStepped(setup, candidates.poor);
+        trained.ended = true;
+        TellPoor(setup, candidates.poor, &trained);
         return trained;
       }
       if (candidates.by_tiles_alone()) return Status::Invalid("no cues of tiles serve");
@@ -233,7 +247,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       if (!least.ok()) return least.status();
       trained.ns = std::max(choice.cost, *least + choice.misses * setup.full_cost);
       trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
-      if (!candidates.poor.empty()) trained.poor = WithStepped(setup, candidates.poor);
+      if (!candidates.poor.empty()) TellPoor(setup, candidates.poor, &trained);
       return trained;
     }
     made = std::move(*best);
@@ -242,7 +256,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   Subspace subspace = std::move(*made);
 
   // What clips lose, another training with a step of some points may win
-  std::vector<std::size_t> poor;
+  Poor poor;
   if (may_end(1) && ends->steps != nullptr && rig.some.empty() && candidates.by_tile &&
       candidates.cost.lost_of_clips.value_or(0) > kManyOfClips) {
     TileSteps of_steps = StepsOfTiles(setup, *ends->steps, kCheapPoints * setup.full_cost);
@@ -251,7 +265,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   }
   const auto with_held = [&](Result<Trained> trained) {
     if (trained.ok()) trained->held = setup.sampler->held();
-    if (trained.ok() && !poor.empty()) trained->poor = WithStepped(setup, poor);
+    if (trained.ok() && !poor.empty()) TellPoor(setup, poor, &*trained);
     return trained;
   };
   if (rig.some.empty())

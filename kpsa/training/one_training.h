@@ -23,6 +23,7 @@ struct Trained {
   double full_ns = 0;  // and the whole evaluation
   double lost = 0;     // of the latter what poses of all kinds lose, that miss or are wrong,
   std::optional<double> lost_of_clips = {};  // and those that are made as the clips are (FrameCost)
+  double wrong = 0;                          // share of these poses that are accepted and wrong
   double seconds = 0;                        // that it took
   bool ended = false;                        // as Ends allows: there is no subspace
   std::vector<std::size_t> untold = {};      // of these, that it gets wrong unnoticed (UntoldControls)
@@ -30,6 +31,8 @@ struct Trained {
   // The points, by mesh, that are to blame for that, or for what clips lose: a last step should be of them alone. Empty, where
   // it ended: with its cues.
   std::vector<std::vector<Index>> poor = {};
+  std::vector<std::vector<Index>> turned =
+      {};  // of these, that lie in creases: what is about them needs the step, too
 };
 
 // Where a training may end without a subspace: with its cues, where these are points that come out, a frame is expected

@@ -16,23 +16,29 @@ constexpr std::size_t kWordBits = 64;
 
 }  // namespace
 
-PointsBeyond::PointsBeyond(std::size_t poses, std::size_t tiles)
+PointsBeyond::PointsBeyond(std::size_t poses, std::size_t tiles, const PoseRanges& ranges,
+                           const PoseBounds& bounds)
     : poses_(poses),
       words_((poses + kWordBits - 1) / kWordBits),
+      ranges_(ranges),
+      bounds_(bounds),
       sizes_(tiles),
-      bits_(tiles * kTilePoints * words_) {}
+      bits_(tiles * kTilePoints * words_),
+      turned_(tiles * kTilePoints) {}
 
-void PointsBeyond::Set(std::size_t tile, const Eigen::MatrixXd& errors, double bound, double bound_of_clips,
-                       std::size_t clip_poses) {
+void PointsBeyond::Set(std::size_t tile, const Eigen::MatrixXd& errors) {
   KPSA_CHECK_EQ(static_cast<std::size_t>(errors.cols()), poses_);
   KPSA_CHECK_LE(static_cast<std::size_t>(errors.rows()), kTilePoints);
   sizes_[tile] = static_cast<std::size_t>(errors.rows());
   for (std::size_t t = 0; t < poses_; ++t) {
+    const bool folded = ranges_.IsFolded(t);
+    const double bound = t < ranges_.clips ? bounds_.clips : folded ? bounds_.folded : bounds_.drawn;
     for (std::size_t k = 0; k < sizes_[tile]; ++k) {
-      if (!(errors(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(t)) >
-            (t < clip_poses ? bound_of_clips : bound)))
-        continue;
-      bits_[(tile * kTilePoints + k) * words_ + t / kWordBits] |= std::uint64_t{1} << t % kWordBits;
+      const double error = errors(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(t));
+      if (!(error > bound)) continue;
+      const std::size_t point = tile * kTilePoints + k;
+      bits_[point * words_ + t / kWordBits] |= std::uint64_t{1} << t % kWordBits;
+      if (folded && error > bounds_.turned) turned_[point] = 1;
     }
   }
 }
@@ -65,25 +71,48 @@ std::vector<std::size_t> PointsBeyond::Worst(double share) const {
   return order;
 }
 
-std::vector<std::size_t> PoorPoints(const PointsBeyond& beyond, const TileSteps& steps, std::size_t every) {
+std::vector<std::size_t> PointsBeyond::Turned() const {
+  std::vector<std::size_t> turned;
+  for (std::size_t p = 0; p < turned_.size(); ++p) {
+    if (turned_[p]) turned.push_back(p);
+  }
+  return turned;
+}
+
+PointsBeyond PointsBeyond::WithoutFolded() const {
+  PointsBeyond others = *this;
+  std::ranges::fill(others.turned_, 0);
+  for (std::size_t t = ranges_.folded_begin; t < ranges_.folded_end; ++t) {
+    for (std::size_t p = 0; p < sizes_.size() * kTilePoints; ++p)
+      others.bits_[p * words_ + t / kWordBits] &= ~(std::uint64_t{1} << t % kWordBits);
+  }
+  return others;
+}
+
+Poor PoorPoints(const PointsBeyond& beyond, const TileSteps& steps, std::size_t every) {
   if (steps.ns.empty()) return {};
-  std::vector<std::size_t> worst = beyond.Worst(0);
+  Poor poor{beyond.Worst(0), beyond.Turned()};
   bool all_step = true;
   double ns = 0;
-  for (const std::size_t p : worst) {
+  for (const std::size_t p : poor.points) {
     const double of_tile = steps.ns[p / kTilePoints * every];
     all_step = all_step && of_tile > 0;
     ns += of_tile / kTilePoints * static_cast<double>(every);
   }
-  if (static_cast<double>(worst.size()) > steps.most_points * static_cast<double>(beyond.points()) ||
+  if (static_cast<double>(poor.points.size()) > steps.most_points * static_cast<double>(beyond.points()) ||
       !all_step || ns > (every > 1 ? kOfMost : 1) * steps.most)
-    worst.clear();
-  return worst;
+    return {};
+  return poor;
 }
 
-std::vector<std::size_t> PoorPoints(const PointsOff& off, const TileSteps& steps, std::size_t every) {
-  std::vector<std::size_t> poor = PoorPoints(off.strict, steps, every);
-  return poor.empty() ? PoorPoints(off.plain, steps, every) : poor;
+Poor PoorPoints(const PointsOff& off, const TileSteps& steps, std::size_t every) {
+  for (const bool folded : {true, false}) {
+    for (const PointsBeyond* beyond : {&off.strict, &off.plain}) {
+      Poor poor = PoorPoints(folded ? *beyond : beyond->WithoutFolded(), steps, every);
+      if (!poor.empty()) return poor;
+    }
+  }
+  return {};
 }
 
 }  // namespace kpsa::engine

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "kpsa/training/random.h"
 
@@ -16,6 +17,8 @@ constexpr std::size_t kHeldAtOnce = 8;
 constexpr std::size_t kLeastOfMany = 8;  // controls that are away from rest where many are
 // Of a mesh's weights, in the share of other controls that move together: shapes add up where they overlap
 constexpr double kWeightsTogether = 0.25;
+constexpr double kOneWay = 0.5;  // of how far a control goes one way, that it goes the other way: it bends
+constexpr double kShortOfEnd = 0.15, kLittle = 0.3;
 
 class Sampler {
  public:
@@ -82,6 +85,28 @@ class Sampler {
     }
   }
 
+  // What bends one way, bent that way: a fist, a folded wing, a crouch. Of what turns both ways, one axis of a node turns
+  // anywhere, or to an end, and the others a little; in every second pose it is the same axis and end of all nodes, as a
+  // tail curls.
+  void Fold(bool curls, SampledPose* pose) {
+    const double share = 0.5 + 0.5 * random_.Unit(), reach = std::min(1.0, 0.4 + 1.2 * random_.Unit());
+    const auto axis = static_cast<int>(random_.Below(3));
+    const bool up = random_.Unit() < 0.5;
+    for (std::size_t begin = 0, end = 0; begin < controls_.size(); begin = end) {
+      for (end = begin + 1; end < controls_.size() && OfOneNode(begin, end); ++end) {
+      }
+      const bool weight = controls_[begin].plug.element >= 0;
+      if (!(random_.Unit() < (weight ? kWeightsTogether * share : share))) continue;
+      const std::size_t any = begin + random_.Below(end - begin);
+      for (std::size_t i = begin; i < end; ++i) {
+        const ControlRange& c = controls_[i];
+        const bool turned = curls ? c.plug.component == axis : i == any;
+        pose->values[i] =
+            c.rest + (Folded(c, turned, curls ? std::optional(up) : std::nullopt) - c.rest) * reach;
+      }
+    }
+  }
+
   // Every control at an end.
   void MoveToEnds(SampledPose* pose) {
     for (std::size_t i = 0; i < controls_.size(); ++i)
@@ -138,6 +163,19 @@ class Sampler {
   }
 
  private:
+  // Controls of a node are neighbours; a mesh's many weights are each on their own.
+  bool OfOneNode(std::size_t a, std::size_t b) const {
+    return controls_[a].plug.node == controls_[b].plug.node && controls_[b].plug.element < 0;
+  }
+  // side: the end that it turns to, or either end or anywhere.
+  double Folded(const ControlRange& c, bool turned, std::optional<bool> side) {
+    const double up = c.max - c.rest, down = c.rest - c.min;
+    const bool one_way = std::min(up, down) <= kOneWay * std::max(up, down);
+    if (!one_way && (!turned || (!side && random_.Unit() < 0.5)))
+      return c.rest + (c.min + (c.max - c.min) * random_.Unit() - c.rest) * (turned ? 1 : kLittle);
+    const double end = (one_way ? up > down : side ? *side : random_.Unit() < 0.5) ? c.max : c.min;
+    return c.rest + (end - c.rest) * (1 - kShortOfEnd * random_.Unit());
+  }
   // `count` different numbers below n.
   std::vector<std::size_t> Some(std::size_t n, std::size_t count) {
     std::vector<std::size_t> all(n);
@@ -234,6 +272,14 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
   Sampler sampler(controls, {}, seed);
   std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
   for (SampledPose& pose : poses) sampler.MoveTogether(&pose);
+  return poses;
+}
+
+std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls, std::size_t count,
+                                     std::uint64_t seed) {
+  Sampler sampler(controls, {}, seed);
+  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
+  for (std::size_t p = 0; p < poses.size(); ++p) sampler.Fold(p % 2 == 1, &poses[p]);
   return poses;
 }
 

@@ -64,6 +64,11 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
 std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls, std::size_t count,
                                        std::uint64_t seed);
 
+// `count` poses in which most of what bends one way is bent that way, as far as it goes or less far, each node's together:
+// fists, folded wings, a crouch. Controls that turn both ways turn a little.
+std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls, std::size_t count,
+                                     std::uint64_t seed);
+
 // `count` poses with every control at its least or its most: among them is about each corner of what three
 // controls of a transform reach, where the entries of its matrix end.
 std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,

@@ -174,7 +174,7 @@ void SubspaceCandidates::FindPoor(const FrameCost& of_tiles) {
   poor = PoorOf(steps);
 }
 
-std::vector<std::size_t> SubspaceCandidates::PoorOf(const TileSteps& of) const {
+Poor SubspaceCandidates::PoorOf(const TileSteps& of) const {
   PointsOff off;
   TileErrors(poses->poses, tiles, fits_, &off);
   return PoorPoints(off, of);
@@ -311,6 +311,9 @@ Status SubspaceCandidates::AddPosesForTiles() {
   modes_poses_ = poses->poses.poses();
   PoseMatrix more(setup->layout);
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
+  const std::size_t drawn = more.poses();
+  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddFolded(poses->poses.poses() + drawn, &more));
+  folded_begin_ = modes_poses_ + drawn, folded_ = more.poses() - drawn;
   record->sampled_poses += more.poses();
   ranges_of_tiles = RangeFinder(setup->layout);
   ranges_of_tiles.Widen(more);
@@ -355,7 +358,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   tried_tiles = true;
   TileCueOptions choice;
   choice.tolerance = setup->options.tolerance;
-  choice.mean = &modes->mean, choice.clip_poses = poses->clip_poses;
+  choice.mean = &modes->mean, choice.ranges = {poses->clip_poses, folded_begin_, folded_begin_ + folded_};
   choice.turn_reach = kTurnReach * modes->diagonal;
   const auto add = [&](Index scalar) {
     const CueRef cue{CueKind::kScalar, scalar};
@@ -382,7 +385,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
 }
 
 // Tiles with inner points are others than those that said which points need them, and so are their cues.
-std::vector<std::size_t> SubspaceCandidates::FindMorePoor() {
+Poor SubspaceCandidates::FindMorePoor() {
   PointsOff off;
   fits_ = FitTiles(tiles, poses->poses);
   TileErrors(poses->poses, tiles, fits_, &off);
@@ -390,8 +393,8 @@ std::vector<std::size_t> SubspaceCandidates::FindMorePoor() {
     std::erase_if(rows, [&](std::size_t row) { return !setup->PointThatComesOut(row); });
     return rows;
   };
-  if (as_they_come_out(off.plain.Worst(kManyBeyond)).empty()) return {};
-  return as_they_come_out(off.plain.Worst(0));
+  if (as_they_come_out(off.plain.WithoutFolded().Worst(kManyBeyond)).empty()) return {};
+  return {as_they_come_out(off.plain.Worst(0)), as_they_come_out(off.plain.Turned())};
 }
 
 TileSubspace SubspaceCandidates::OfTiles(bool finely) {

@@ -60,7 +60,7 @@ struct SubspaceCandidates {
   bool dear = false;
   TileSteps steps = {};  // that some points may go through, in another training
   // Points, of the rows that are trained on (PointsBeyond): they alone are to blame that cues of tiles are not promising
-  std::vector<std::size_t> poor = {};
+  Poor poor = {};
   bool may_find_more = false;        // of these, besides those that go through a step already
   FrameCost cost = {};               // by the last calibration, but points
   TileChoice tiles = {};             // where they were tried
@@ -89,7 +89,7 @@ struct SubspaceCandidates {
   // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
   Result<double> LeastForAllPoints() const;
   // The points that these steps should be of, where cues of tiles were chosen: those that poses take far from the tolerance.
-  std::vector<std::size_t> PoorOf(const TileSteps& of) const;
+  Poor PoorOf(const TileSteps& of) const;
   double alike() const;         // at how much more cues of tiles are taken
   bool by_tiles_alone() const;  // the rig has some points before a last step
   // Nobody knows what all points would measure.
@@ -116,13 +116,14 @@ struct SubspaceCandidates {
   void Tried(const char* what, const CueSet& of, double misses, double ns);
   Status AddPosesForTiles();
   Status FindCandidatesOfTiles();
-  std::vector<std::size_t> FindMorePoor();
+  Poor FindMorePoor();
   Result<PricedTiles> PriceTiles();
   void FindPoor(const FrameCost& of_tiles);  // where many miss
 
   std::vector<TileCandidates> tile_candidates_ = {}, learning_tiles_ = {};
-  std::size_t modes_poses_ = 0;           // of the poses, those that modes are found of
-  std::optional<PoseMatrix> tile_poses_;  // the others, where they were set aside
+  std::size_t modes_poses_ = 0;                // of the poses, those that modes are found of
+  std::size_t folded_begin_ = 0, folded_ = 0;  // likewise, those that are folded
+  std::optional<PoseMatrix> tile_poses_;       // the others, where they were set aside
   TriedTiles trial_ = {};
   std::optional<PricedTiles> priced_tiles_;
   bool began_with_tiles_ = false;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "kpsa/training/cue_selection.h"
+#include "kpsa/training/poor_points.h"
 #include "kpsa/training/pose_matrix.h"
 #include "kpsa/training/tile_builder.h"
 
@@ -28,7 +29,7 @@ struct TileCandidates {
 struct TileCueOptions {
   double tolerance = 1e-4;                // scene units
   const Eigen::VectorXd* mean = nullptr;  // of the poses' columns
-  std::size_t clip_poses = 0;             // the first poses are of clips
+  PoseRanges ranges;                      // of the poses
   std::vector<CueRef> values;             // that may move any tile: weights of morph targets, envelopes
   double turn_reach = 0;  // scene units that an entry of a rotation, or a value, moves points, about
 };

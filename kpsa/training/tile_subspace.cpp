@@ -20,6 +20,8 @@ namespace {
 // Of the tolerance: a point that is farther off in one pose goes through a last step, if it can; clips come back to their
 // poses, and go on from there, so less is admitted in them
 constexpr double kPoor = 0.5, kOfClips = 0.5, kPoorStrictly = 0.3;
+constexpr double kPoorFolded = 0.5,
+                 kTurned = 1;           // likewise in folded poses; and where these turn a crease over
 constexpr double kBeforeStep = 0.4;     // of the budgets of a tile that gives what a last step reads
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
@@ -165,9 +167,14 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, st
                            PointsOff* points_off) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
   const double tolerance = choice.options.tolerance;
+  const PoseRanges& ranges = choice.options.ranges;
   if (points_off != nullptr) {
-    points_off->strict = PointsBeyond(poses.poses(), choice.candidates.size());
-    points_off->plain = points_off->strict;
+    const auto beyond = [&](double bound) {
+      return PointsBeyond(
+          poses.poses(), choice.candidates.size(), ranges,
+          {bound * tolerance, kOfClips * bound * tolerance, kPoorFolded * tolerance, kTurned * tolerance});
+    };
+    points_off->strict = beyond(kPoorStrictly), points_off->plain = beyond(kPoor);
   }
   Eigen::MatrixXf errors(count, static_cast<Eigen::Index>(choice.candidates.size()));
   ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -181,12 +188,11 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice, st
                                 MultiplyFloats(GemmOperand::Dense(fitted.gain), GemmOperand::Dense(measured));
       const Eigen::MatrixXd off = PointErrors(fitted.target - told);
       errors.col(static_cast<Eigen::Index>(t)) = off.colwise().maxCoeff().cast<float>();
-      if (points_off == nullptr) continue;
-      const auto set = [&](PointsBeyond* beyond, double bound) {
-        beyond->Set(t, off, bound, kOfClips * bound, choice.options.clip_poses);
-      };
-      set(&points_off->strict, kPoorStrictly * tolerance);
-      set(&points_off->plain, kPoor * tolerance);
+      errors.col(static_cast<Eigen::Index>(t))
+          .segment(static_cast<Eigen::Index>(ranges.folded_begin),
+                   static_cast<Eigen::Index>(ranges.folded_end - ranges.folded_begin))
+          .setZero();
+      if (points_off != nullptr) points_off->strict.Set(t, off), points_off->plain.Set(t, off);
     }
   });
   return errors;

@@ -39,7 +39,7 @@ struct TilePromise {
 struct PromisingTiles {
   bool promising = false;
   // Where they are not: the points that are to blame (PoorPoints)
-  std::vector<std::size_t> poor = {};
+  Poor poor = {};
 };
 // What an earlier question found, of the same poses, candidates and options: errors of some tiles, and the choice.
 struct TriedTiles {
@@ -67,8 +67,7 @@ TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size
 void FinishTiles(TileSubspace* made);
 
 // How far off a point of each tile of the choice would be in each of the same poses, were they stored exactly.
-// [poses x tiles]; fits: as MakeTileSubspace has them, or empty. beyond: which points are beyond half the
-// tolerance, or a quarter in a frame of a clip.
+// [poses x tiles], 0 in folded poses, which say only which points are off; fits: as MakeTileSubspace has them, or empty.
 Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
                            std::span<const TileModel> fits = {}, PointsOff* off = nullptr);
 // Share of the poses in which a tile is farther off, but some of them.

@@ -19,6 +19,8 @@ namespace {
 // What a frame costs, in last steps: where cues say so, points that come out need no subspace of their own; where poses
 // made of the clips do, inner points are tried; and of that, with which they are taken
 constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
+// Likewise, where so many poses of the other are accepted and wrong, and half as many of it
+constexpr double kManyWrong = 0.005, kTruer = 1.3;
 // Of a full frame: what a frame made as the clips are costs, with which controls that clips do not move are tried at rest;
 // and of that, what it costs then
 constexpr double kDearFollowing = 0.5, kCheaperAtRest = 0.75;
@@ -130,6 +132,20 @@ std::vector<std::vector<Index>> AllAbout(const std::vector<std::vector<Index>>& 
   return all;
 }
 
+// What a training says that a last step should be of, and about creases what the step of these points reads.
+std::vector<std::vector<Index>> WithCreases(const TrainingRig& split, const Trained& told) {
+  std::vector<std::vector<Index>> all = told.poor;
+  for (std::size_t m = 0; m < told.turned.size(); ++m) {
+    const LastStep* const step = split.step(m);
+    if (told.turned[m].empty() || step == nullptr) continue;
+    for (const Index inner : step->InnerOf(PointSet::Of(told.turned[m], static_cast<Index>(step->points()))))
+      all[m].push_back(step->PointOf(inner));
+    std::ranges::sort(all[m]);
+    all[m].erase(std::unique(all[m].begin(), all[m].end()), all[m].end());
+  }
+  return all;
+}
+
 // With a step of these points alone; where it turns out that a few more need it, with these. Ends as TrainOnce does.
 Result<Trained> TrainStepped(const TrainingRig& split, const std::vector<std::vector<Index>>& points,
                              const std::vector<TrainingClip>& clips, TrainOptions options) {
@@ -139,7 +155,7 @@ Result<Trained> TrainStepped(const TrainingRig& split, const std::vector<std::ve
   const Ends more;
   Result<Trained> trained = TrainOnce(*of_points, clips, options, {}, &more);
   if (trained.ok() && trained->ended) {
-    of_points = OfPoints(split, trained->poor);
+    of_points = OfPoints(split, WithCreases(split, *trained));
     KPSA_CHECK(of_points.has_value());  // they are laid out anew
     options.seconds = limit.left();
     trained = TrainOnce(*of_points, clips, options);
@@ -152,6 +168,11 @@ Result<Trained> TrainStepped(const TrainingRig& split, const std::vector<std::ve
 double CostOfClips(const Trained& trained) {
   if (trained.ended || !trained.lost_of_clips) return trained.ns;
   return trained.ns + (*trained.lost_of_clips - trained.lost) * trained.full_ns;
+}
+
+// Of what the other one is expected to cost: one that reconstructs inner points is taken at less.
+double AlikeOf(const Trained& inner, const Trained& whole) {
+  return whole.wrong > kManyWrong && inner.wrong < whole.wrong / 2 ? kTruer : kCheaperInner;
 }
 
 // Of what a training that ended is expected to cost: one with a step of some points is taken at less. The steps of all
@@ -215,10 +236,10 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   rest.seconds = limit.left();
   std::optional<Trained> some;
   if (!whole->poor.empty()) {
-    Result<Trained> made = TrainStepped(**split, whole->poor, clips, rest);
+    Result<Trained> made = TrainStepped(**split, WithCreases(**split, *whole), clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
-      const double alike = whole->ended ? AlikeOfExpected(*made, options) : kCheaperInner;
+      const double alike = whole->ended ? AlikeOfExpected(*made, options) : AlikeOf(*made, *whole);
       if (made->ns < enough && CostOfClips(*made) < alike * of_whole) {
         if (!whole->ended) NameTried(&*whole, "");
         AddTried(*whole, &*made);
@@ -251,7 +272,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   }
   if (!inner.ok()) return whole;
   if (!whole->ended) NameTried(&*whole, "");
-  const bool cheaper = CostOfClips(*inner) < kCheaperInner * CostOfClips(*whole);
+  const bool cheaper = CostOfClips(*inner) < AlikeOf(*inner, *whole) * CostOfClips(*whole);
   AddTried(cheaper ? *whole : *inner, cheaper ? &*inner : &*whole);
   return cheaper ? std::move(inner) : std::move(whole);
 }

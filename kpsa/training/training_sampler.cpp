@@ -15,6 +15,7 @@ constexpr std::size_t kLeastSamples = 200;
 constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
 constexpr std::size_t kAtEnds = 40;   // poses: each of eight corners is missed by one transform in 200
 constexpr double kTogether = 0.3;     // of the samples, besides: poses that move most controls at once
+constexpr double kFolded = 0.2;       // likewise, in which what bends one way is bent
 constexpr std::pair<PoseKind, double> kOtherKinds[] = {{PoseKind::kBeyond, 0.08},
                                                        {PoseKind::kMixture, 0.06},
                                                        {PoseKind::kNeighbours, 0.06},
@@ -73,19 +74,32 @@ std::vector<SampledPose> TrainingSampler::SweepsWithTilts() const {
 
 Result<std::size_t> TrainingSampler::AddTraining(std::size_t most, PoseMatrix* poses) const {
   if (options_.samples > 0) KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
-  const std::size_t count = std::min({options_.samples, most, std::max(RoomBeside(*poses), kLeastSamples)});
+  const std::size_t count =
+      std::min({options_.samples, most, std::max(RoomBeside(poses->poses()), kLeastSamples)});
   KPSA_RETURN_IF_ERROR(AddSampled(count, options_.seed, poses));
   return count;
 }
 
 Status TrainingSampler::AddMore(const PoseMatrix& beside, PoseMatrix* poses) const {
   const std::uint64_t seed = options_.seed ^ 0xa54ff53a5f1d36f1ull;
-  const std::size_t room = RoomBeside(beside), count = std::min(options_.samples, room);
+  const std::size_t room = RoomBeside(beside.poses()), count = std::min(options_.samples, room);
   KPSA_RETURN_IF_ERROR(AddSampled(count, seed, poses));
   const auto together = static_cast<std::size_t>(kTogether * static_cast<double>(options_.samples));
   std::vector<SampledPose> at_once = PosesTogether(drawn_, std::min(together, room - count), ~seed);
   AddTilts(rig_.controls, drawn_.size(), ~seed, &at_once);
   return recorder_->AddSamples(at_once, clips_, poses);
+}
+
+std::vector<SampledPose> TrainingSampler::Folded(std::size_t count, std::uint64_t seed) const {
+  std::vector<SampledPose> folded = PosesFolded(drawn_, count, seed);
+  AddTilts(rig_.controls, drawn_.size(), seed, &folded);
+  return folded;
+}
+
+Status TrainingSampler::AddFolded(std::size_t beside, PoseMatrix* poses) const {
+  const auto wanted = static_cast<std::size_t>(kFolded * static_cast<double>(options_.samples));
+  return recorder_->AddSamples(
+      Folded(std::min(wanted, RoomBeside(beside)), options_.seed ^ 0x510e527fade682d1ull), clips_, poses);
 }
 
 Status TrainingSampler::AddEnds(PoseMatrix* poses) const {
@@ -94,9 +108,9 @@ Status TrainingSampler::AddEnds(PoseMatrix* poses) const {
   return recorder_->AddSamples(at_ends, clips_, poses);
 }
 
-std::size_t TrainingSampler::RoomBeside(const PoseMatrix& poses) const {
+std::size_t TrainingSampler::RoomBeside(std::size_t poses) const {
   const std::size_t fit = kMostPoseBytes / PoseBytes();
-  return fit - std::min(fit, poses.poses());
+  return fit - std::min(fit, poses);
 }
 
 Status TrainingSampler::AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) const {

@@ -39,6 +39,10 @@ class TrainingSampler {
   // More samples, of another seed, as far as there is room beside the poses; and PosesTogether, for tiles with
   // cues of their own.
   Status AddMore(const PoseMatrix& beside, PoseMatrix* poses) const;
+  // PosesFolded, as many as there is room for beside so many poses.
+  Status AddFolded(std::size_t beside, PoseMatrix* poses) const;
+  // PosesFolded, not recorded.
+  std::vector<SampledPose> Folded(std::size_t count, std::uint64_t seed) const;
   // Of which only the values of transforms are of use, not the points.
   Status AddEnds(PoseMatrix* poses) const;
   // New poses that judge; kinds: the PoseKind of each.
@@ -47,7 +51,7 @@ class TrainingSampler {
  private:
   bool of_light() const { return rig_.target.colors; }
   std::size_t PoseBytes() const { return sizeof(float) * layout_.columns(); }
-  std::size_t RoomBeside(const PoseMatrix& poses) const;
+  std::size_t RoomBeside(std::size_t poses) const;
   Status AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) const;
 
   const TrainingRig& rig_;

@@ -50,6 +50,72 @@ TEST(PosesTogether, TurnEachTransformAboutAllOfItsAxesWithinItsRanges) {
   EXPECT_LT(weights, 200u);
 }
 
+// A hinge, a ball joint and a hinge the other way, and a weight.
+std::vector<ControlRange> HingesOfALimb() {
+  std::vector<ControlRange> controls = Controls();
+  controls.insert(controls.begin() + 6, controls.begin() + 3, controls.begin() + 6);
+  for (std::size_t c = 6; c < 9; ++c) controls[c].plug.node = NodeId{3};
+  controls[0].min = -0.1, controls[0].max = 2;
+  for (const std::size_t c : {1u, 2u, 4u, 5u, 7u, 8u}) controls[c].min = -0.5, controls[c].max = 0.5;
+  controls[3].min = -1, controls[3].max = 1;
+  controls[6].min = -2, controls[6].max = 0.1;
+  return controls;
+}
+
+TEST(PosesFolded, BendHingesTheirWayTogether) {
+  const std::vector<ControlRange> controls = HingesOfALimb();
+  const auto hinge = [](const SampledPose& pose, std::size_t c) { return std::fabs(pose.values[c]); };
+  std::size_t fists = 0, curled[2] = {0, 0}, weights = 0;
+  const std::vector<SampledPose> poses = PosesFolded(controls, 400, 7);
+  ASSERT_EQ(poses.size(), 400u);
+  for (const SampledPose& pose : poses) {
+    ASSERT_EQ(pose.values.size(), controls.size());
+    for (std::size_t c = 0; c < controls.size(); ++c) {
+      EXPECT_GE(pose.values[c], controls[c].min);
+      EXPECT_LE(pose.values[c], controls[c].max);
+    }
+    EXPECT_GE(pose.values[0], 0) << "a hinge bends its way, or rests";
+    EXPECT_LE(pose.values[6], 0);
+    const bool folds = hinge(pose, 0) > 1.7 && hinge(pose, 6) > 1.7;
+    fists += folds && std::fabs(pose.values[1]) < 0.16 && std::fabs(pose.values[7]) < 0.16;
+    for (const bool up : {false, true})
+      curled[up] += folds && (up ? pose.values[3] > 0.85 : pose.values[3] < -0.85);
+    weights += pose.values[9] != 0;
+  }
+  EXPECT_GT(fists, 15u)
+      << "both hinges bent nearly as far as they go, and next to nothing else of them turned";
+  EXPECT_GT(curled[0], 5u);
+  EXPECT_GT(curled[1], 5u);
+  EXPECT_GT(weights, 20u);
+  EXPECT_LT(weights, 200u);
+  EXPECT_TRUE(PosesFolded({}, 60, 7).empty());
+}
+
+TEST(PosesFolded, CurlChainsOneWay) {
+  // Six joints that turn both ways
+  std::vector<ControlRange> chain;
+  for (Index node = 0; node < 6; ++node) {
+    for (int axis = 0; axis < 3; ++axis) {
+      ControlRange& control = chain.emplace_back();
+      control.plug = {NodeId{node}, 0};
+      control.plug.component = axis;
+      control.min = -1, control.max = 1;
+    }
+  }
+  std::set<std::pair<int, bool>> curls;
+  for (const SampledPose& pose : PosesFolded(chain, 600, 7)) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const bool up : {false, true}) {
+        bool all = true;
+        for (std::size_t node = 0; node < 6; ++node)
+          all = all && (up ? 1 : -1) * pose.values[3 * node + static_cast<std::size_t>(axis)] > 0.6;
+        if (all) curls.emplace(axis, up);
+      }
+    }
+  }
+  EXPECT_EQ(curls.size(), 6u) << "about each axis, both ways";
+}
+
 TEST(PosesAtEnds, HaveEveryCornerOfEachTransform) {
   const std::vector<ControlRange> controls = Controls();
   std::set<int> corners[2];

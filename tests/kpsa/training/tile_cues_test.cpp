@@ -208,7 +208,20 @@ TEST(TileCues, SayWhatTheyWouldMiss) {
   // Without the entries of a joint hardly a pose is told
   TileChoice blind = limb.choice;
   for (std::vector<std::uint32_t>& cues : blind.tiles.of_tile) cues.clear();
-  EXPECT_GT(ShareBeyond(TileErrors(limb.poses, blind), kLimbTolerance), 0.5);
+  const Eigen::MatrixXf of_blind = TileErrors(limb.poses, blind);
+  EXPECT_GT(ShareBeyond(of_blind, kLimbTolerance), 0.5);
+  // Folded poses count for none, but say which points are off
+  blind.options.ranges = {0, 0, 1000};
+  PointsOff off;
+  const Eigen::MatrixXf but_folded = TileErrors(limb.poses, blind, {}, &off);
+  EXPECT_EQ(but_folded.topRows(1000).cwiseAbs().maxCoeff(), 0);
+  EXPECT_EQ(but_folded.bottomRows(200), of_blind.bottomRows(200));
+  blind.options.ranges = {};
+  PointsOff of_drawn;
+  TileErrors(limb.poses, blind, {}, &of_drawn);
+  EXPECT_FALSE(off.plain.Turned().empty());
+  EXPECT_TRUE(of_drawn.plain.Turned().empty());
+  EXPECT_EQ(off.plain.Worst(0), of_drawn.plain.Worst(0)) << "beyond half the tolerance in any pose";
 }
 
 TEST(TileCues, SayInHowManyPosesTilesAreBeyond) {
