@@ -194,9 +194,9 @@ std::string_view LineOf(std::string_view text, int line) {
   return text.substr(0, text.find('\n'));
 }
 
-// Where `[` breaks a flow map or list: an identifier directly followed by '[' after a '{' or '[' of the same
-// line.
-bool HasBareBracket(std::string_view line) {
+// Whether a flow map or list of the line has a character outside of quotes that breaks it there.
+template <typename Breaks>
+bool HasBare(std::string_view line, const Breaks& breaks) {
   std::size_t open = line.find_first_of("{[");
   while (open != std::string_view::npos && open > 0 && line[open - 1] != ' ')
     open = line.find_first_of("{[", open + 1);
@@ -208,11 +208,23 @@ bool HasBareBracket(std::string_view line) {
       if (c == quote) quote = 0;
     } else if (c == '"' || c == '\'') {
       quote = c;
-    } else if (line[i + 1] == '[' && c != ' ' && c != '[' && c != '{' && c != ',' && c != ':') {
+    } else if (breaks(c, line[i + 1])) {
       return true;
     }
   }
   return false;
+}
+// An identifier directly followed by '['.
+bool HasBareBracket(std::string_view line) {
+  return HasBare(line, [](char c, char next) {
+    return next == '[' && c != ' ' && c != '[' && c != '{' && c != ',' && c != ':';
+  });
+}
+// A name with ?, or one that begins with *, which is an alias to YAML.
+bool HasBarePattern(std::string_view line) {
+  return HasBare(line, [](char c, char next) {
+    return next == '?' || (next == '*' && (c == ' ' || c == '[' || c == '{' || c == ','));
+  });
 }
 
 class ViewBuffer final : public std::streambuf {
@@ -230,6 +242,7 @@ Status SyntaxError(const YAML::Exception& error, std::string_view text, const st
     message += "; quote plugs that contain [ ] inside { } or [ ]";
   }
   const std::string_view here = LineOf(text, line);
+  if (HasBarePattern(here)) message += "; quote names with ? or * inside { } or [ ]";
   if (here.substr(0, here.find_first_not_of(" \t")).find('\t') != std::string_view::npos) {
     message += "; indent with spaces, YAML allows no tabs there";
   }

@@ -181,8 +181,9 @@ std::string TrainText(const TrainResult& r) {
   }
   if (std::isfinite(r.subspace->activity_limit))
     text +=
-        "poses with many controls far out would hit and be wrong: where a quarter more is out of rest at once "
-        "than in the clips, they miss\n";
+        "poses with many controls far out are wrong unnoticed: where a quarter more is out of rest at once "
+        "than in "
+        "the clips, frames miss\n";
   if (!r.worst_path.empty()) {
     text += fmt::format("worst that is accepted: {} ({}{}); {} replays it\n", error(r.record.worst.error),
                         r.record.worst.kind,

@@ -206,9 +206,7 @@ Status LimitActivity(const Calibrator& of, const CalibrationWork& work, const st
   };
   for (const std::vector<float>& entries : work.ranges->played()) play(entries);
   for (std::size_t i = 0; i < judged.poses.size(); ++i) {
-    const SampledPose& pose = judged.poses[i];
-    if (pose.kind != PoseKind::kBeyond && !pose.folded)
-      play(judged.entries[i]);  // nobody folds all limbs at once
+    if (judged.poses[i].kind != PoseKind::kBeyond) play(judged.entries[i]);
   }
   if (played > 0) subspace->activity_limit = kBeyondPlayed * played;
   return Status();

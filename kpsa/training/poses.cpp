@@ -18,7 +18,6 @@ constexpr std::size_t kLeastOfMany = 8;  // controls that are away from rest whe
 // Of a mesh's weights, in the share of other controls that move together: shapes add up where they overlap
 constexpr double kWeightsTogether = 0.25;
 constexpr double kOneWay = 0.5;  // of how far a control goes one way, that it goes the other way: it bends
-constexpr std::size_t kFoldsOfNeighbours = 4;  // of so many poses of neighbours, one
 constexpr double kShortOfEnd = 0.15, kLittle = 0.3;
 
 class Sampler {
@@ -356,12 +355,7 @@ std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRan
         sampler.Mixture(&pose);
         break;
       case PoseKind::kNeighbours:
-        if (p % kFoldsOfNeighbours == 0) {
-          sampler.Fold(p % (2 * kFoldsOfNeighbours) == 0, &pose);
-          pose.folded = true;
-        } else {
-          sampler.Neighbours(groups, &pose);
-        }
+        sampler.Neighbours(groups, &pose);
         break;
       case PoseKind::kHeld:
         sampler.Hold(held, p, clips, &pose);

@@ -35,7 +35,6 @@ struct SampledPose {
   double phase = 0;  // 0..1 of the clip
   PoseKind kind = PoseKind::kSampled;
   bool near_clips = false;  // made of frames of the clips: what playback resembles
-  bool folded = false;      // as PosesFolded are
 };
 
 // What the controls have to be at the frames of the training clips to give the same pose without a clip: one
@@ -88,7 +87,7 @@ std::vector<SampledPose> PosesAlone(const std::vector<ControlRange>& controls,
                                     std::span<const std::size_t> held, std::size_t each, std::size_t clips,
                                     std::uint64_t seed);
 
-// `count` poses of a kind; of neighbours one in four is folded. None where there are no controls for it (or groups, of kNeighbours; or clips, of kHeld).
+// `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours; or clips, of kHeld).
 std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
                                      const ClipPoses& clip_poses, const ControlGroups& groups,
                                      std::size_t clips, std::size_t count, std::uint64_t seed);

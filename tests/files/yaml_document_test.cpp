@@ -66,6 +66,9 @@ TEST(YamlDocument, PlacesSyntaxErrors) {
   const std::string value = Failure("n: {type: x, input: lips.cv[1]}\n");
   EXPECT_TRUE(Has(value, "quote plugs that contain [ ] inside { }")) << value;
   EXPECT_FALSE(Has(Failure("a: [1, 2\n"), "quote plugs"));
+  for (const char* pattern : {"mask: [f?_*, g]\n", "mask: [a, *_L]\n", "mask: [?inger]\n"})
+    EXPECT_TRUE(Has(Failure(pattern), "quote names with ? or * inside { } or [ ]")) << Failure(pattern);
+  EXPECT_FALSE(Has(Failure("a: [1, finger*, \"f?\"\n"), "quote names"));
 }
 
 TEST(YamlDocument, BoundsAliases) {

@@ -91,20 +91,6 @@ TEST(PosesFolded, BendHingesTheirWayTogether) {
   EXPECT_TRUE(PosesFolded({}, 60, 7).empty());
 }
 
-TEST(PosesOfKind, FoldOneInFourOfNeighbours) {
-  const std::vector<ControlRange> controls = HingesOfALimb();
-  std::size_t folded = 0, few = 0;
-  for (const SampledPose& pose :
-       PosesOfKind(PoseKind::kNeighbours, controls, {}, {{0, 3}, {3, 6}}, 0, 400, 7)) {
-    std::size_t away = 0;
-    for (std::size_t c = 0; c < controls.size(); ++c) away += pose.values[c] != 0;
-    folded += pose.folded;
-    few += !pose.folded && away == 2;
-  }
-  EXPECT_EQ(folded, 100u);
-  EXPECT_EQ(few, 300u) << "the others turn two of a group";
-}
-
 TEST(PosesFolded, CurlChainsOneWay) {
   // Six joints that turn both ways
   std::vector<ControlRange> chain;
