@@ -15,7 +15,7 @@ constexpr std::size_t kLeastSamples = 200;
 constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
 constexpr std::size_t kAtEnds = 40;   // poses: each of eight corners is missed by one transform in 200
 constexpr double kTogether = 0.3;     // of the samples, besides: poses that move most controls at once
-constexpr double kFolded = 0.2;       // likewise, in which what bends one way is bent
+constexpr double kFolded = 0.1;       // likewise, in which what bends one way is bent
 constexpr std::pair<PoseKind, double> kOtherKinds[] = {{PoseKind::kBeyond, 0.08},
                                                        {PoseKind::kMixture, 0.06},
                                                        {PoseKind::kNeighbours, 0.06},
