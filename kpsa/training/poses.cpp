@@ -85,9 +85,7 @@ class Sampler {
     }
   }
 
-  // What bends one way, bent that way: a fist, a folded wing, a crouch. Of what turns both ways, one axis of a node turns
-  // anywhere, or to an end, and the others a little; in every second pose it is the same axis and end of all nodes, as a
-  // tail curls.
+  // As PosesFolded says; curls: the same axis and end of all nodes.
   void Fold(bool curls, SampledPose* pose) {
     const double share = 0.5 + 0.5 * random_.Unit(), reach = std::min(1.0, 0.4 + 1.2 * random_.Unit());
     const auto axis = static_cast<int>(random_.Below(3));

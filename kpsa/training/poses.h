@@ -65,7 +65,8 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
                                        std::uint64_t seed);
 
 // `count` poses in which most of what bends one way is bent that way, as far as it goes or less far, each node's together:
-// fists, folded wings, a crouch. Controls that turn both ways turn a little.
+// fists, folded wings, a crouch. Of what turns both ways, one axis of a node turns anywhere or to an end, and the others a
+// little; in every second pose it is the same axis and end of all nodes, as a tail curls.
 std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed);
 
