@@ -52,9 +52,7 @@ class Sampler {
     bool from_b = false;
     for (std::size_t i = 0; i < controls_.size(); ++i) {
       const ControlRange& c = controls_[i];
-      // A node's controls are neighbours; a mesh's many weights are each on their own
-      if (i == 0 || controls_[i - 1].plug.node != c.plug.node || c.plug.element >= 0)
-        from_b = random_.Unit() < split;
+      if (i == 0 || !OfOneNode(i - 1, i)) from_b = random_.Unit() < split;
       const double value = c.rest + ((from_b ? b[i] : a[i]) - c.rest) * (from_b ? reach_b : reach_a);
       pose->values[i] = std::clamp(value, c.min, c.max);
     }
@@ -79,7 +77,7 @@ class Sampler {
     bool moves = false;
     for (std::size_t i = 0; i < controls_.size(); ++i) {
       const ControlRange& c = controls_[i];
-      if (i == 0 || controls_[i - 1].plug.node != c.plug.node || c.plug.element >= 0)
+      if (i == 0 || !OfOneNode(i - 1, i))
         moves = random_.Unit() < (c.plug.element >= 0 ? kWeightsTogether * share : share);
       if (moves) pose->values[i] = c.rest + (c.min + (c.max - c.min) * random_.Unit() - c.rest) * reach;
     }
@@ -198,6 +196,16 @@ class Sampler {
   Random random_;
 };
 
+// `count` poses; none without controls. draw: takes one away from rest, and knows whether its number is odd.
+template <typename Draw>
+std::vector<SampledPose> FromRest(const std::vector<ControlRange>& controls, std::size_t count,
+                                  std::uint64_t seed, const Draw& draw) {
+  Sampler sampler(controls, {}, seed);
+  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
+  for (std::size_t p = 0; p < poses.size(); ++p) draw(&sampler, p % 2 == 1, &poses[p]);
+  return poses;
+}
+
 // At most `count` of the poses, each as far as possible from those before it: what is rare in a clip (a
 // blink) is not rare among them. Distances in shares of the controls' ranges.
 ClipPoses Different(const ClipPoses& poses, const std::vector<ControlRange>& controls, std::size_t count) {
@@ -267,34 +275,22 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
 
 std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls, std::size_t count,
                                        std::uint64_t seed) {
-  Sampler sampler(controls, {}, seed);
-  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
-  for (SampledPose& pose : poses) sampler.MoveTogether(&pose);
-  return poses;
+  return FromRest(controls, count, seed,
+                  [](Sampler* of, bool, SampledPose* pose) { of->MoveTogether(pose); });
 }
-
 std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed) {
-  Sampler sampler(controls, {}, seed);
-  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
-  for (std::size_t p = 0; p < poses.size(); ++p) sampler.Fold(p % 2 == 1, &poses[p]);
-  return poses;
+  return FromRest(controls, count, seed,
+                  [](Sampler* of, bool odd, SampledPose* pose) { of->Fold(odd, pose); });
 }
-
 std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed) {
-  Sampler sampler(controls, {}, seed);
-  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
-  for (SampledPose& pose : poses) sampler.MoveToEnds(&pose);
-  return poses;
+  return FromRest(controls, count, seed, [](Sampler* of, bool, SampledPose* pose) { of->MoveToEnds(pose); });
 }
-
 std::vector<SampledPose> PosesWithMany(const std::vector<ControlRange>& controls, std::size_t count,
                                        std::uint64_t seed) {
-  Sampler sampler(controls, {}, seed);
-  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
-  for (std::size_t p = 0; p < poses.size(); ++p) sampler.MoveManyAnywhere(p % 2 == 1, &poses[p]);
-  return poses;
+  return FromRest(controls, count, seed,
+                  [](Sampler* of, bool odd, SampledPose* pose) { of->MoveManyAnywhere(odd, pose); });
 }
 
 std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls,

@@ -9,17 +9,20 @@
 namespace kpsa::engine {
 namespace {
 
+// A transform turned about three axes, from -1 to max.
+void AddTurns(Index node, double max, std::vector<ControlRange>* controls) {
+  for (int axis = 0; axis < 3; ++axis) {
+    ControlRange& control = controls->emplace_back();
+    control.plug = {NodeId{node}, 0};
+    control.plug.component = axis;
+    control.min = -1, control.max = max;
+  }
+}
+
 // Two transforms turned about three axes each, and two weights of a mesh.
 std::vector<ControlRange> Controls() {
   std::vector<ControlRange> controls;
-  for (Index node = 0; node < 2; ++node) {
-    for (int axis = 0; axis < 3; ++axis) {
-      ControlRange& control = controls.emplace_back();
-      control.plug = {NodeId{node}, 0};
-      control.plug.component = axis;
-      control.min = -1, control.max = 2;
-    }
-  }
+  for (Index node = 0; node < 2; ++node) AddTurns(node, 2, &controls);
   for (int element = 0; element < 2; ++element) {
     ControlRange& control = controls.emplace_back();
     control.plug = {NodeId{2}, 1};
@@ -94,14 +97,7 @@ TEST(PosesFolded, BendHingesTheirWayTogether) {
 TEST(PosesFolded, CurlChainsOneWay) {
   // Six joints that turn both ways
   std::vector<ControlRange> chain;
-  for (Index node = 0; node < 6; ++node) {
-    for (int axis = 0; axis < 3; ++axis) {
-      ControlRange& control = chain.emplace_back();
-      control.plug = {NodeId{node}, 0};
-      control.plug.component = axis;
-      control.min = -1, control.max = 1;
-    }
-  }
+  for (Index node = 0; node < 6; ++node) AddTurns(node, 1, &chain);
   std::set<std::pair<int, bool>> curls;
   for (const SampledPose& pose : PosesFolded(chain, 600, 7)) {
     for (int axis = 0; axis < 3; ++axis) {
