@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 
+#include "kpsa/training/branches.h"
 #include "kpsa/training/random.h"
 
 namespace kpsa::engine {
@@ -84,15 +85,15 @@ class Sampler {
   }
 
   // As PosesFolded says; curls: the same axis and end of all nodes.
-  void Fold(bool curls, SampledPose* pose) {
+  void Fold(std::span<const Branch> branches, bool curls, SampledPose* pose) {
     const double share = 0.5 + 0.5 * random_.Unit(), reach = std::min(1.0, 0.4 + 1.2 * random_.Unit());
     const auto axis = static_cast<int>(random_.Below(3));
     const bool up = random_.Unit() < 0.5;
-    for (std::size_t begin = 0, end = 0; begin < controls_.size(); begin = end) {
-      for (end = begin + 1; end < controls_.size() && OfOneNode(begin, end); ++end) {
-      }
+    const std::vector<bool> still = StillBranches(branches, &random_);
+    for (std::size_t b = 0; b < branches.size(); ++b) {
+      const auto [begin, end, above] = branches[b];
       const bool weight = controls_[begin].plug.element >= 0;
-      if (!(random_.Unit() < (weight ? kWeightsTogether * share : share))) continue;
+      if (still[b] || !(random_.Unit() < (weight ? kWeightsTogether * share : share))) continue;
       const std::size_t any = begin + random_.Below(end - begin);
       for (std::size_t i = begin; i < end; ++i) {
         const ControlRange& c = controls_[i];
@@ -278,10 +279,11 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
   return FromRest(controls, count, seed,
                   [](Sampler* of, bool, SampledPose* pose) { of->MoveTogether(pose); });
 }
-std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls, std::size_t count,
+std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls,
+                                     std::span<const Branch> branches, std::size_t count,
                                      std::uint64_t seed) {
   return FromRest(controls, count, seed,
-                  [](Sampler* of, bool odd, SampledPose* pose) { of->Fold(odd, pose); });
+                  [&](Sampler* of, bool odd, SampledPose* pose) { of->Fold(branches, odd, pose); });
 }
 std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed) {

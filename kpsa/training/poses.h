@@ -12,6 +12,8 @@
 
 namespace kpsa::engine {
 
+struct Branch;  // kpsa/training/branches.h
+
 struct ControlRange {
   PlugRef plug;
   double min = 0, max = 0, rest = 0;
@@ -67,8 +69,9 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
 // `count` poses in which most of what bends one way is bent that way, as far as it goes or less far, each node's together:
 // fists, folded wings, a crouch. Of what turns both ways, one axis of a node turns anywhere or to an end, and the others a
 // little; in every second pose it is the same axis and end of all nodes, as a tail curls.
-std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls, std::size_t count,
-                                     std::uint64_t seed);
+// Of many branches that hang from one node, a few (StillBranches); branches: BranchesOf the controls.
+std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls,
+                                     std::span<const Branch> branches, std::size_t count, std::uint64_t seed);
 
 // `count` poses with every control at its least or its most: among them is about each corner of what three
 // controls of a transform reach, where the entries of its matrix end.

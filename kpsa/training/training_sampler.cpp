@@ -15,7 +15,7 @@ constexpr std::size_t kLeastSamples = 200;
 constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
 constexpr std::size_t kAtEnds = 40;   // poses: each of eight corners is missed by one transform in 200
 constexpr double kTogether = 0.3;     // of the samples, besides: poses that move most controls at once
-constexpr double kFolded = 0.1;       // likewise, in which what bends one way is bent
+constexpr double kFolded = 0.2;       // likewise, in which what bends one way is bent
 constexpr std::pair<PoseKind, double> kOtherKinds[] = {{PoseKind::kBeyond, 0.08},
                                                        {PoseKind::kMixture, 0.06},
                                                        {PoseKind::kNeighbours, 0.06},
@@ -31,6 +31,7 @@ TrainingSampler::TrainingSampler(const TrainingRig& rig, std::vector<ControlRang
                                  PoseRecorder* recorder, const PoseLayout& layout)
     : rig_(rig),
       drawn_(std::move(drawn)),
+      branches_(BranchesOf(*rig.graph, drawn_)),
       clips_(clips),
       options_(options),
       recorder_(recorder),
@@ -91,7 +92,7 @@ Status TrainingSampler::AddMore(const PoseMatrix& beside, PoseMatrix* poses) con
 }
 
 std::vector<SampledPose> TrainingSampler::Folded(std::size_t count, std::uint64_t seed) const {
-  std::vector<SampledPose> folded = PosesFolded(drawn_, count, seed);
+  std::vector<SampledPose> folded = PosesFolded(drawn_, branches_, count, seed);
   AddTilts(rig_.controls, drawn_.size(), seed, &folded);
   return folded;
 }

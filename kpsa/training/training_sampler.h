@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "kpsa/training/branches.h"
 #include "kpsa/training/control_groups.h"
 #include "kpsa/training/pose_recorder.h"
 
@@ -56,6 +57,7 @@ class TrainingSampler {
 
   const TrainingRig& rig_;
   const std::vector<ControlRange> drawn_;
+  const std::vector<Branch> branches_;
   const std::vector<TrainingClip>& clips_;
   const TrainOptions& options_;
   PoseRecorder* recorder_;

@@ -66,37 +66,47 @@ TEST_F(ManyPoints, TilesOfPartsAreThoseOfAllAtOnce) {
   }
 }
 
+// How far a point is off, each mesh by itself.
+double LargestOfAMesh(const Subspace& trained, const RunFrame& exact, const RunFrame& frame) {
+  double most = 0;
+  std::size_t first = 0;
+  for (const SubspaceOutput& output : trained.outputs) {
+    const auto of = [&](const std::vector<float>& all) {
+      return std::vector<float>(all.begin() + static_cast<std::ptrdiff_t>(first),
+                                all.begin() + static_cast<std::ptrdiff_t>(first + 3 * output.points));
+    };
+    most = std::max(most, LargestDistance(of(exact.points), of(frame.points)));
+    first += 3 * output.points;
+  }
+  return most;
+}
+
 class BySome : public ManyPoints, public ::testing::WithParamInterface<bool> {};
 
+// By three seeds: how many frames hit after so few samples is a matter of luck (0 to 29 of 40, by seed).
 TEST_P(BySome, AllPointsKeepTheTolerance) {
-  const TrainOptions options = Options(GetParam());
-  const auto trained = Train(options, Points() / 3);
-  ASSERT_NE(trained, nullptr);
-  EXPECT_EQ(trained->by_tile(), GetParam());
-  RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = trained});
-  ASSERT_TRUE(run.ok()) << run.error;
-  std::size_t points = 0, hits = 0, beyond = 0;
-  for (const SubspaceOutput& output : trained->outputs) points += output.points;
-  EXPECT_EQ(points, Points());
-  const auto poses = SmoothPoses(run.rig, 40, 0.6);
-  for (const auto& pose : poses) {
-    full.Pose(pose), run.Pose(pose);
-    const RunFrame exact = full.Evaluate(), frame = run.Evaluate();
-    hits += frame.hit;
-    double most = 0;
-    std::size_t first = 0;
-    for (const SubspaceOutput& output : trained->outputs) {  // each mesh by itself
-      const auto of = [&](const std::vector<float>& all) {
-        return std::vector<float>(all.begin() + static_cast<std::ptrdiff_t>(first),
-                                  all.begin() + static_cast<std::ptrdiff_t>(first + 3 * output.points));
-      };
-      most = std::max(most, LargestDistance(of(exact.points), of(frame.points)));
-      first += 3 * output.points;
+  std::size_t poses = 0, hits = 0, beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    TrainOptions options = Options(GetParam());
+    options.seed = seed;
+    const auto trained = Train(options, Points() / 3);
+    ASSERT_NE(trained, nullptr);
+    EXPECT_EQ(trained->by_tile(), GetParam());
+    RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = trained});
+    ASSERT_TRUE(run.ok()) << run.error;
+    std::size_t points = 0;
+    for (const SubspaceOutput& output : trained->outputs) points += output.points;
+    EXPECT_EQ(points, Points());
+    for (const auto& pose : SmoothPoses(run.rig, 40, 0.6)) {
+      full.Pose(pose), run.Pose(pose);
+      const RunFrame exact = full.Evaluate(), frame = run.Evaluate();
+      ++poses;
+      hits += frame.hit;
+      beyond += LargestOfAMesh(*trained, exact, frame) > options.tolerance;
     }
-    beyond += most > options.tolerance;
   }
-  EXPECT_GT(hits, poses.size() / 4);
-  EXPECT_LE(static_cast<double>(beyond), 0.1 * static_cast<double>(poses.size()));
+  EXPECT_GT(hits, poses / 4);
+  EXPECT_LE(static_cast<double>(beyond), 0.1 * static_cast<double>(poses));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BySome, ::testing::Bool(),

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
+
+#include "kpsa/training/branches.h"
 
 namespace kpsa::engine {
 namespace {
@@ -30,6 +33,17 @@ std::vector<ControlRange> Controls() {
     control.max = 1;
   }
   return controls;
+}
+
+// None of which carries another, as of BranchesOf.
+std::vector<Branch> Apart(const std::vector<ControlRange>& controls) {
+  std::vector<Branch> branches;
+  for (std::size_t c = 0; c < controls.size(); ++c) {
+    if (c == 0 || controls[c].plug.element >= 0 || controls[c].plug.node != controls[c - 1].plug.node)
+      branches.push_back({.begin = c, .end = c});
+    branches.back().end = c + 1;
+  }
+  return branches;
 }
 
 TEST(PosesTogether, TurnEachTransformAboutAllOfItsAxesWithinItsRanges) {
@@ -69,7 +83,7 @@ TEST(PosesFolded, BendHingesTheirWayTogether) {
   const std::vector<ControlRange> controls = HingesOfALimb();
   const auto hinge = [](const SampledPose& pose, std::size_t c) { return std::fabs(pose.values[c]); };
   std::size_t fists = 0, curled[2] = {0, 0}, weights = 0;
-  const std::vector<SampledPose> poses = PosesFolded(controls, 400, 7);
+  const std::vector<SampledPose> poses = PosesFolded(controls, Apart(controls), 400, 7);
   ASSERT_EQ(poses.size(), 400u);
   for (const SampledPose& pose : poses) {
     ASSERT_EQ(pose.values.size(), controls.size());
@@ -91,7 +105,7 @@ TEST(PosesFolded, BendHingesTheirWayTogether) {
   EXPECT_GT(curled[1], 5u);
   EXPECT_GT(weights, 20u);
   EXPECT_LT(weights, 200u);
-  EXPECT_TRUE(PosesFolded({}, 60, 7).empty());
+  EXPECT_TRUE(PosesFolded({}, {}, 60, 7).empty());
 }
 
 TEST(PosesFolded, CurlChainsOneWay) {
@@ -99,7 +113,7 @@ TEST(PosesFolded, CurlChainsOneWay) {
   std::vector<ControlRange> chain;
   for (Index node = 0; node < 6; ++node) AddTurns(node, 1, &chain);
   std::set<std::pair<int, bool>> curls;
-  for (const SampledPose& pose : PosesFolded(chain, 600, 7)) {
+  for (const SampledPose& pose : PosesFolded(chain, Apart(chain), 600, 7)) {
     for (int axis = 0; axis < 3; ++axis) {
       for (const bool up : {false, true}) {
         bool all = true;
@@ -110,6 +124,26 @@ TEST(PosesFolded, CurlChainsOneWay) {
     }
   }
   EXPECT_EQ(curls.size(), 6u) << "about each axis, both ways";
+}
+
+TEST(PosesFolded, LeaveMostOfManyAsTheyAre) {
+  std::vector<ControlRange> face;
+  for (Index node = 0; node < 12; ++node) AddTurns(node, 1, &face);
+  std::vector<Branch> branches = Apart(face);
+  for (std::size_t b = 1; b < branches.size(); ++b) branches[b].above = 0;
+  const auto folded = [&face](const SampledPose& pose) {
+    std::size_t count = 0;
+    for (std::size_t c = 3; c < face.size(); c += 3)
+      count += pose.values[c] != 0 || pose.values[c + 1] != 0 || pose.values[c + 2] != 0;
+    return count;
+  };
+  std::size_t most = 0, head = 0;
+  for (const SampledPose& pose : PosesFolded(face, branches, 200, 7)) {
+    most = std::max(most, folded(pose));
+    head += pose.values[0] != 0;
+  }
+  EXPECT_EQ(most, 5u);
+  EXPECT_GT(head, 100u) << "the one they hang from turns as ever";
 }
 
 TEST(PosesAtEnds, HaveEveryCornerOfEachTransform) {
