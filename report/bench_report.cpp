@@ -125,7 +125,8 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
 // Whether so many frames of clips miss that a subspace should learn from them.
 bool MayLearn(const BenchResult& r) {
   const bool of_clips = !r.clips.empty() && r.clips.front() != "(rest)";
-  return of_clips && !r.light && r.promise.tolerance > 0 && 2 * r.hits < r.frames;
+  return of_clips && !r.light && r.promise.tolerance > 0 &&
+         (2 * r.hits < r.frames || (r.hits < r.frames && !r.promise.kept()));
 }
 
 }  // namespace

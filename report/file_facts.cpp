@@ -212,9 +212,8 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
     std::size_t stepped = 0;
     for (const SubspaceOutput& output : subspace->outputs) stepped += output.stepped.points.size();
     facts.facts.emplace_back(
-        "reconstructs", stepped == 0
-                            ? std::string("points before the last step")
-                            : fmt::format("points, and {} of them before the last step", stepped));
+        "reconstructs", stepped == 0 ? std::string("points before the last step")
+                                     : fmt::format("points, and {} of them before the last step", stepped));
   }
   if (std::isfinite(subspace->activity_limit))
     facts.facts.emplace_back("most at once", fmt::format("{:.3g}, of squared shares of what signals reached",

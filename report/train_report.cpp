@@ -23,6 +23,9 @@ std::size_t TrainResult::points() const {
 
 namespace {
 
+// Tolerances of the worst accepted pose, that are no matter of how sharp a crease is.
+constexpr double kFarOff = 5;
+
 ToleranceWords WordsOf(const TrainResult& r) {
   return {"poses", "more --samples or narrower controls help", r.subspace->of_light()};
 }
@@ -185,10 +188,15 @@ std::string TrainText(const TrainResult& r) {
         "than in "
         "the clips, frames miss\n";
   if (!r.worst_path.empty()) {
-    text += fmt::format("worst that is accepted: {} ({}{}); {} replays it\n", error(r.record.worst.error),
-                        r.record.worst.kind,
-                        r.record.worst.clip.empty() ? "" : fmt::format(", over {}", r.record.worst.clip),
-                        r.worst_path);
+    const double tolerances = r.subspace->tolerance > 0 ? r.record.worst.error / r.subspace->tolerance : 0;
+    text += fmt::format(
+        "worst that is accepted: {}{} ({}{}); {} replays it\n", error(r.record.worst.error),
+        tolerances > 1 ? fmt::format(", {:.1f} tolerances", tolerances) : "", r.record.worst.kind,
+        r.record.worst.clip.empty() ? "" : fmt::format(", over {}", r.record.worst.clip), r.worst_path);
+    if (tolerances > kFarOff)
+      text += fmt::format(
+          "that is {:.0f} tolerances: look at it, and at the controls it moves, before this is used\n",
+          tolerances);
   }
   if (r.check.poses > 0) {
     text += fmt::format(

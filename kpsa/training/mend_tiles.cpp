@@ -114,12 +114,35 @@ struct Off {
   bool has_clips = false;
   Off(std::size_t points, bool of_clips)
       : clips(points, 0), samples(points, 0), folded(points, 0), has_clips(of_clips) {}
-  double of(std::size_t point) const {
-    const double other = kOfSamples * static_cast<double>(folded[point]);
-    return std::max(other, has_clips ? static_cast<double>(clips[point])
-                                     : kOfSamples * static_cast<double>(samples[point]));
+  double InClips(std::size_t point) const {
+    return has_clips ? static_cast<double>(clips[point]) : kOfSamples * static_cast<double>(samples[point]);
   }
+  double Folded(std::size_t point) const { return kOfSamples * static_cast<double>(folded[point]); }
 };
+
+// Points [first, first + count) that are beyond `bound`, the farthest off first; numbers from `first` on.
+std::vector<Index> FarthestOff(const Off& off, double (Off::*far)(std::size_t) const, std::size_t first,
+                               std::size_t count, double bound) {
+  std::vector<Index> worst;
+  for (Index p = 0; p < count; ++p) {
+    if ((off.*far)(first + p) > bound) worst.push_back(p);
+  }
+  std::ranges::stable_sort(worst, std::greater<>(), [&](Index p) { return (off.*far)(first + p); });
+  return worst;
+}
+
+// Which of them are to be mended, ascending: of clips and of folded poses half each, where both have so many.
+std::vector<Index> ToMend(const Off& off, std::size_t first, std::size_t count, double bound) {
+  const std::size_t most = std::max(kMostMendedPoints, count / kAPointOf);
+  std::vector<Index> points = FarthestOff(off, &Off::InClips, first, count, bound);
+  const std::vector<Index> folded = FarthestOff(off, &Off::Folded, first, count, bound);
+  points.resize(std::min(points.size(), most - std::min(folded.size(), most / 2)));
+  for (const Index p : folded) {
+    if (points.size() < most && std::ranges::find(points, p) == points.end()) points.push_back(p);
+  }
+  std::ranges::sort(points);
+  return points;
+}
 
 Double3 At(ConstPointsView points, std::size_t i) {
   return {static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
@@ -306,13 +329,9 @@ Status MendTiles(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>&
   for (std::size_t m = 0; m < subspace->outputs.size(); ++m) {
     const std::size_t count = subspace->outputs[m].points;
     const LastStep* const step = split[m].step.get();
-    std::vector<Index> worst;
-    for (Index p = 0; step != nullptr && p < count; ++p) {
-      if (off.of(first_point + p) > kOff * setup->options.tolerance) worst.push_back(p);
-    }
-    std::ranges::stable_sort(worst, std::greater<>(), [&](Index p) { return off.of(first_point + p); });
-    worst.resize(std::min(worst.size(), std::max(kMostMendedPoints, count / kAPointOf)));
-    std::ranges::sort(worst);
+    const std::vector<Index> worst = step == nullptr
+                                         ? std::vector<Index>()
+                                         : ToMend(off, first_point, count, kOff * setup->options.tolerance);
     for (const Index point : worst) {
       const auto tile = static_cast<Index>(point / kTilePoints);
       if (wanted.empty() || wanted.back().output != m || wanted.back().tile != tile)

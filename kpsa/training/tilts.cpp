@@ -9,8 +9,9 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kTiltShare = 0.01;  // of the ranges of the axes that are controlled, together
-constexpr double kMostTilt = 0.03;   // radians
+constexpr double kTiltShare = 0.01;   // of the ranges of the axes that are controlled, together
+constexpr double kMostTilt = 0.03;    // radians
+constexpr double kShiftShare = 0.05;  // likewise of shifts
 
 // Of three controls about the axes of a transform, the one that turns least.
 void TiltTheThird(const std::size_t of_axes[3], std::vector<ControlRange>* controls) {
@@ -22,44 +23,61 @@ void TiltTheThird(const std::size_t of_axes[3], std::vector<ControlRange>* contr
   if (half(by_range[0]) < tilt) (*controls)[by_range[0]].tilt = tilt;
 }
 
-}  // namespace
+// What the controls of a transform do of one kind, by axis.
+struct Moved {
+  NodeId node;
+  double range = 0;
+  bool axes[3] = {false, false, false};
+  std::size_t controls[3] = {};
+};
 
-TrainingRig WithTilts(const TrainingRig& rig) {
-  TrainingRig with = rig;
-  if (rig.target.colors) return with;
-  struct Turned {
-    NodeId node;
-    double range = 0;
-    bool axes[3] = {false, false, false};
-    std::size_t controls[3] = {};  // of these
-  };
-  std::map<Index, Turned> turned;
+std::map<Index, Moved> MovedBy(const TrainingRig& rig, const char* attribute) {
+  std::map<Index, Moved> moved;
   for (std::size_t i = 0; i < rig.controls.size(); ++i) {
     const ControlRange& control = rig.controls[i];
-    const NodeDef& def = rig.graph->def(control.plug.node);
     const int c = control.plug.component;
-    if (control.plug.attribute != def.FindAttribute("rotate") || c < 0 || c > 2) continue;
-    Turned& of = turned[control.plug.node.index];
+    if (control.plug.attribute != rig.graph->def(control.plug.node).FindAttribute(attribute) || c < 0 ||
+        c > 2)
+      continue;
+    Moved& of = moved[control.plug.node.index];
     of.node = control.plug.node;
     of.range += control.max - control.min;
     of.axes[c] = true;
     of.controls[c] = i;
   }
+  return moved;
+}
+
+// A control for each axis that has none, of those plugs.
+void AddAxes(const Moved& of, const std::vector<PlugRef>& plugs, double tilt, TrainingRig* with) {
+  for (std::size_t c = 0; c < plugs.size(); ++c) {
+    if (of.axes[c]) continue;
+    const Value* set = with->graph->FindValue(plugs[c]);
+    const double rest = set != nullptr && set->get_if<double>() != nullptr ? set->get<double>() : 0;
+    with->controls.push_back({plugs[c], rest - tilt, rest + tilt, rest});
+  }
+}
+
+}  // namespace
+
+TrainingRig WithTilts(const TrainingRig& rig) {
+  TrainingRig with = rig;
+  if (rig.target.colors) return with;
+  const std::map<Index, Moved> turned = MovedBy(rig, "rotate");
   for (const auto& [index, of] : turned) {
     const int count = of.axes[0] + of.axes[1] + of.axes[2];
-    if (count == 3) {
-      TiltTheThird(of.controls, &with.controls);
-      continue;
-    }
-    const std::vector<PlugRef> axes = FreePlugs(*rig.graph, of.node).rotate;
-    if (count != 2 || axes.empty()) continue;
+    if (count == 3) TiltTheThird(of.controls, &with.controls);
+    if (count == 2)
+      AddAxes(of, FreePlugs(*rig.graph, of.node).rotate, std::min(kMostTilt, kTiltShare * of.range), &with);
+  }
+  for (const auto& [index, of] : MovedBy(rig, "translate")) {
+    if (!turned.contains(index) || of.range == 0) continue;
+    const double tilt = kShiftShare * of.range;
     for (std::size_t c = 0; c < 3; ++c) {
-      if (of.axes[c]) continue;
-      const Value* set = rig.graph->FindValue(axes[c]);
-      const double rest = set != nullptr && set->get_if<double>() != nullptr ? set->get<double>() : 0;
-      const double tilt = std::min(kMostTilt, kTiltShare * of.range);
-      with.controls.push_back({axes[c], rest - tilt, rest + tilt, rest});
+      ControlRange& control = with.controls[of.controls[c]];
+      if (of.axes[c] && (control.max - control.min) / 2 < tilt) control.tilt = tilt;
     }
+    AddAxes(of, FreePlugs(*rig.graph, of.node).translate, tilt, &with);
   }
   return with;
 }

@@ -76,5 +76,25 @@ TEST_F(Tilts, AThirdAxisWithoutAControlGetsOne) {
   EXPECT_EQ(rig_->graph->PlugName(with.controls.back().plug), "upper.rotate.y");
 }
 
+// On top of a clip a shift goes where the clip has turned the joint.
+TEST_F(Tilts, AJointThatTurnsAndShiftsAlongOneAxisShiftsALittleAlongTheOthers) {
+  const TrainingRig rig =
+                        With("  upper.rotateX: {min: -30, max: 30}\n  upper.translateY: {min: -2, max: 2}\n"),
+                    with = WithTilts(rig);
+  const ControlRange& along = Of(rig, "upper.translate.y");
+  for (const char* plug : {"upper.translate.x", "upper.translate.z"}) {
+    const ControlRange& across = Of(with, plug);
+    EXPECT_NEAR(across.max, 0.05 * (along.max - along.min), 1e-12);
+    EXPECT_EQ(across.min, -across.max);
+  }
+  EXPECT_EQ(Of(with, "upper.translate.y").tilt, 0);
+}
+
+TEST_F(Tilts, AHandleThatOnlyShiftsIsLeftAsItIs) {
+  const TrainingRig rig = With("  lower.translateY: {min: -2, max: 2}\n");
+  for (const ControlRange& control : WithTilts(rig).controls)
+    EXPECT_NE(rig_->graph->PlugName(control.plug), "lower.translate.x");
+}
+
 }  // namespace
 }  // namespace kpsa::engine

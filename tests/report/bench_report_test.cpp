@@ -55,6 +55,11 @@ TEST(BenchReport, SaysWhySlowerAndWhatToDoWhereFramesMiss) {
   has("next: kpsa eval man.yaml --kpsa old.kpsa -o fast.npz");
   result.clips = {"walk"}, result.hits = 5;
   has("next: kpsa eval");
+  result.promise.frames = 10, result.promise.beyond = 5, result.promise.rate = 0.03;
+  has("next: kpsa learn man.yaml --kpsa old.kpsa --clips walk --force");
+  result.hits = 10;  // nothing misses that could be learnt
+  has("next: kpsa eval");
+  result.hits = 5, result.promise.beyond = 0;
   result.full_ms_on_hits = 1, result.accelerated_ms_on_hits = 0.1;
   has("frames that miss cost it once more, and too few hit");
   result.accelerated_ms_on_hits = 2;
