@@ -89,7 +89,10 @@ class Bench {
         for (std::size_t f = first; f < end && !watch_.cancelled(); ++f) watch_.Done(done_++, 0);
       }
     }
-    for (Side* side : timed) side->times.Finish();
+    for (Side* side : timed) {
+      const auto of = std::ranges::find(contenders_, side, [](const Contender& c) { return c.side.get(); });
+      side->times.Finish(of == contenders_.end() ? std::vector<int>() : of->KindsOfFrames(times.size()));
+    }
     reference_.AddTimes();
     for (Contender& contender : contenders_) {
       contender.AddTimes(full.times);

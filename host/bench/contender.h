@@ -59,6 +59,7 @@ struct Contender {
   void Describe();
   void Compare(std::int64_t frame, const Evaluator& full, const std::string& clip);
   void NoteClip(const std::string& clip, bool still);
+  std::vector<int> KindsOfFrames(std::size_t frames) const;  // of the last clip: FrameTimes::Finish
   void AddTimes(const FrameTimes& full);
   void AddFullProfile(const Plan& plan, const RecordedSteps& recorded, double full_ns);
   void AddProfile(const RecordedSteps& recorded, double fast_ns);

@@ -56,6 +56,13 @@ void NoteTimes(BenchResult* result) {
 
 }  // namespace
 
+std::vector<int> Contender::KindsOfFrames(std::size_t frames) const {
+  std::vector<int> kinds;
+  for (std::size_t f = result.per_frame.size() - frames; f < result.per_frame.size(); ++f)
+    kinds.push_back(static_cast<int>(result.per_frame[f].decision.verdict()));
+  return kinds;
+}
+
 void Contender::AddTimes(const FrameTimes& full) {
   const auto add_runs = [](const std::vector<std::vector<double>>& frames, std::vector<double>* runs) {
     for (const std::vector<double>& frame : frames) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <map>
 #include <numeric>
 
 #include "graph/profile.h"
@@ -61,7 +62,7 @@ void FrameTimes::EndTurn() {
   turns_.back().excess = std::max(0.0, wall - cpu);
 }
 
-const std::vector<std::vector<double>>& FrameTimes::Finish() {
+const std::vector<std::vector<double>>& FrameTimes::Finish(std::span<const int> kinds) {
   std::vector<double> shortest;
   for (const std::vector<double>& runs : ns_)
     shortest.push_back(runs.empty() ? 0 : *std::min_element(runs.begin(), runs.end()));
@@ -71,8 +72,10 @@ const std::vector<std::vector<double>>& FrameTimes::Finish() {
     for (std::size_t f = turn.first; f < turn.end; ++f) times.push_back(ns_[f][turn.run]);
     // Of a single run the other frames of the turn tell how long one should be
     if (ns_[turn.first].size() == 1) {
-      const double typical = Median(times);
-      for (double& floor : floors) floor = std::min(floor, typical);
+      std::map<int, std::vector<double>> alike;
+      const auto kind = [&](std::size_t i) { return kinds.empty() ? 0 : kinds[turn.first + i]; };
+      for (std::size_t i = 0; i < times.size(); ++i) alike[kind(i)].push_back(times[i]);
+      for (std::size_t i = 0; i < times.size(); ++i) floors[i] = std::min(floors[i], Median(alike[kind(i)]));
     }
     TakeOff(turn.excess, floors, times);
     for (std::size_t f = turn.first; f < turn.end; ++f) ns_[f][turn.run] = times[f - turn.first];

@@ -28,8 +28,9 @@ class FrameTimes {
   void BeginTurn(std::size_t first_frame);
   void Add(std::uint64_t ns);  // the next frame, by ProfileClock
   void EndTurn();
-  // After all runs: the times of each frame, one a run.
-  const std::vector<std::vector<double>>& Finish();
+  // After all runs: the times of each frame, one a run. kinds: of each frame, those of one kind take about as long (a
+  // frame that misses takes many times as long as one that hits); empty: all do. Only asked of a single run.
+  const std::vector<std::vector<double>>& Finish(std::span<const int> kinds = {});
   const std::vector<std::vector<double>>& ns() const { return ns_; }
   double wall_ns() const { return wall_ns_; }  // of all turns
   double cpu_ns() const { return cpu_ns_; }    // 0 where the CPU clock is not used

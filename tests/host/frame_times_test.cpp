@@ -49,5 +49,24 @@ TEST(FrameTimes, WaitingIsNoWork) {
   }
 }
 
+// What a frame waited is not taken off another that works longer, as one that misses among some that hit.
+TEST(FrameTimes, OfASingleRunOnlyFramesOfAKindAreAlike) {
+  constexpr std::uint64_t kWait = 5'000'000, kWork = 20'000'000;
+  FrameTimes times(4, true);
+  times.BeginTurn(0);
+  for (int f = 0; f < 4; ++f) {
+    const std::uint64_t begin = ProfileClock(), worked = ThreadCpuClock();
+    if (f == 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kWait));
+    while (f == 2 && ThreadCpuClock() < worked + kWork) {
+    }
+    times.Add(ProfileClock() - begin);
+  }
+  times.EndTurn();
+  const std::vector<int> kinds = {0, 0, 1, 0};
+  const std::vector<std::vector<double>> ns = times.Finish(kinds);
+  EXPECT_LT(ns[0][0], 0.5 * kWait);
+  EXPECT_GT(ns[2][0], 0.99 * kWork);
+}
+
 }  // namespace
 }  // namespace kpsa::engine
