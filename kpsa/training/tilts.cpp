@@ -9,9 +9,10 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kTiltShare = 0.01;   // of the ranges of the axes that are controlled, together
-constexpr double kMostTilt = 0.03;    // radians
-constexpr double kShiftShare = 0.05;  // likewise of shifts
+constexpr double kTiltShare = 0.01;  // of the ranges of the axes that are controlled, together
+constexpr double kMostTilt = 0.03;   // radians
+constexpr double kShiftShare = 0.05,
+                 kShiftOfLeast = 0.5;  // likewise of shifts; and of the least range, at most
 
 // Of three controls about the axes of a transform, the one that turns least.
 void TiltTheThird(const std::size_t of_axes[3], std::vector<ControlRange>* controls) {
@@ -71,13 +72,21 @@ TrainingRig WithTilts(const TrainingRig& rig) {
       AddAxes(of, FreePlugs(*rig.graph, of.node).rotate, std::min(kMostTilt, kTiltShare * of.range), &with);
   }
   for (const auto& [index, of] : MovedBy(rig, "translate")) {
-    if (!turned.contains(index) || of.range == 0) continue;
-    const double tilt = kShiftShare * of.range;
+    if (!turned.contains(index)) continue;
+    const auto range = [&](std::size_t c) {
+      const ControlRange& control = rig.controls[of.controls[c]];
+      return of.axes[c] ? control.max - control.min : 0;
+    };
+    double least = of.range;  // of the axes that have one
     for (std::size_t c = 0; c < 3; ++c) {
-      ControlRange& control = with.controls[of.controls[c]];
-      if (of.axes[c] && (control.max - control.min) / 2 < tilt) control.tilt = tilt;
+      if (range(c) > 0) least = std::min(least, range(c));
     }
-    AddAxes(of, FreePlugs(*rig.graph, of.node).translate, tilt, &with);
+    const double shift = std::min(kShiftShare * of.range, kShiftOfLeast * least);
+    if (shift == 0) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (of.axes[c] && range(c) == 0) with.controls[of.controls[c]].tilt = shift;
+    }
+    AddAxes(of, FreePlugs(*rig.graph, of.node).translate, shift, &with);
   }
   return with;
 }

@@ -1,6 +1,8 @@
 // What training turns though no control or hardly one does (kpsa/training/tilts.h).
 #include "kpsa/training/tilts.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "host/rig_training.h"
@@ -88,6 +90,15 @@ TEST_F(Tilts, AJointThatTurnsAndShiftsAlongOneAxisShiftsALittleAlongTheOthers) {
     EXPECT_EQ(across.min, -across.max);
   }
   EXPECT_EQ(Of(with, "upper.translate.y").tilt, 0);
+}
+
+TEST_F(Tilts, AJointThatShiftsAlongAllAxesShiftsAsTheRigSays) {
+  const TrainingRig rig = With(
+      "  upper.rotateX: {min: -30, max: 30}\n  upper.translateX: {min: -1, max: 1}\n"
+      "  upper.translateY: {min: -2, max: 2}\n  upper.translateZ: {min: 0, max: 900}\n");
+  const TrainingRig with = WithTilts(rig);
+  for (const char* axis : {"x", "y", "z"})
+    EXPECT_EQ(Of(with, fmt::format("upper.translate.{}", axis)).tilt, 0);
 }
 
 TEST_F(Tilts, AHandleThatOnlyShiftsIsLeftAsItIs) {
