@@ -140,6 +140,10 @@ TEST_F(OddRigs, APartOfPointsIsNoControl) {
       "nodes: {c: {type: curve, vertices: [0, 1]}}\ncontrols:\n"
       "  c.cv[1].x: {min: -1, max: 1}\n");
   EXPECT_TRUE(Has(text, "t.yaml:5:3: c.cv[1].x is a part of points and cannot be a control")) << text;
+  const std::string grid = Errors(
+      "nodes: {c: {type: lattice, divisions: [2, 2, 2]}}\ncontrols:\n"
+      "  \"c.points[1,0,1].x\": {min: -1, max: 1}\n");
+  EXPECT_TRUE(Has(grid, "c.points[1,0,1].x is a part of points")) << grid << "as it was written";
 }
 
 TEST_F(OddRigs, CurvesOfEveryKind) {

@@ -33,7 +33,7 @@ void AddControls(const BuildInput& in, std::vector<Control>* controls) {
       refuse(Status::Invalid(
           "{} is a part of points and cannot be a control: connect a transform's translate to "
           "the point and make that the control",
-          name));
+          from.plug.text));
       continue;
     }
     if (const auto [it, added] = seen.emplace(KeyOf(*plug), from.plug.text); !added) {
