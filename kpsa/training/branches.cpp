@@ -31,10 +31,8 @@ std::vector<Branch> BranchesOf(const Graph& graph, const std::vector<ControlRang
   std::vector<Branch> branches;
   std::map<Index, std::size_t> by_node;
   for (std::size_t c = 0; c < controls.size(); ++c) {
-    const PlugRef& plug = controls[c].plug;
-    const bool same = c > 0 && plug.element < 0 && controls[c - 1].plug.node == plug.node;
-    if (!same) {
-      by_node.emplace(plug.node.index, branches.size());
+    if (c == 0 || !OfOneNode(controls[c - 1], controls[c])) {
+      by_node.emplace(controls[c].plug.node.index, branches.size());
       branches.push_back({.begin = c, .end = c});
     }
     branches.back().end = c + 1;

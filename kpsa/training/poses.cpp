@@ -53,7 +53,7 @@ class Sampler {
     bool from_b = false;
     for (std::size_t i = 0; i < controls_.size(); ++i) {
       const ControlRange& c = controls_[i];
-      if (i == 0 || !OfOneNode(i - 1, i)) from_b = random_.Unit() < split;
+      if (i == 0 || !OfOneNode(controls_[i - 1], c)) from_b = random_.Unit() < split;
       const double value = c.rest + ((from_b ? b[i] : a[i]) - c.rest) * (from_b ? reach_b : reach_a);
       pose->values[i] = std::clamp(value, c.min, c.max);
     }
@@ -78,7 +78,7 @@ class Sampler {
     bool moves = false;
     for (std::size_t i = 0; i < controls_.size(); ++i) {
       const ControlRange& c = controls_[i];
-      if (i == 0 || !OfOneNode(i - 1, i))
+      if (i == 0 || !OfOneNode(controls_[i - 1], c))
         moves = random_.Unit() < (c.plug.element >= 0 ? kWeightsTogether * share : share);
       if (moves) pose->values[i] = c.rest + (c.min + (c.max - c.min) * random_.Unit() - c.rest) * reach;
     }
@@ -160,10 +160,6 @@ class Sampler {
   }
 
  private:
-  // Controls of a node are neighbours; a mesh's many weights are each on their own.
-  bool OfOneNode(std::size_t a, std::size_t b) const {
-    return controls_[a].plug.node == controls_[b].plug.node && controls_[b].plug.element < 0;
-  }
   // side: the end that it turns to, or either end or anywhere.
   double Folded(const ControlRange& c, bool turned, std::optional<bool> side) {
     const double up = c.max - c.rest, down = c.rest - c.min;

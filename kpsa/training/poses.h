@@ -29,6 +29,12 @@ struct ControlRange {
   double tilt = 0;    // training turns it so far from rest, though its range is less (kpsa/training/tilts.h)
 };
 
+// Whether b belongs to the node of a, the control before it: controls of a node are neighbours; a mesh's many weights are
+// each on their own.
+inline bool OfOneNode(const ControlRange& a, const ControlRange& b) {
+  return a.plug.node == b.plug.node && b.plug.element < 0;
+}
+
 // Control values of one pose (by control), and where in the training clips it plays: clip < 0 is the rest
 // pose.
 struct SampledPose {

@@ -39,8 +39,7 @@ std::vector<ControlRange> Controls() {
 std::vector<Branch> Apart(const std::vector<ControlRange>& controls) {
   std::vector<Branch> branches;
   for (std::size_t c = 0; c < controls.size(); ++c) {
-    if (c == 0 || controls[c].plug.element >= 0 || controls[c].plug.node != controls[c - 1].plug.node)
-      branches.push_back({.begin = c, .end = c});
+    if (c == 0 || !OfOneNode(controls[c - 1], controls[c])) branches.push_back({.begin = c, .end = c});
     branches.back().end = c + 1;
   }
   return branches;
