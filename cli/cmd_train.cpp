@@ -55,6 +55,9 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
   if (flags.tolerance.has_value()) {
     const Result<double> value = ParseLength("--tolerance", *flags.tolerance);
     if (!value.ok()) return value.status();
+    if (!(*value > 0))
+      return Status::Usage("--tolerance {}: nothing is ever accepted at 0; a length above 0, as in 1mm",
+                           *flags.tolerance);
     options->tolerance = *value;
   }
   if (flags.time.has_value()) {

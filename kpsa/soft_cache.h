@@ -113,13 +113,15 @@ struct TrainedRange {
 // [min, max] widened on both sides by `slack` (what moves no point noticeably) and by rounding (1e-6 of the
 // magnitude, of at least 1: an entry that rested at 0 in training may come out as 1e-11).
 TrainedRange MakeTrainedRange(std::string plug, double min, double max, double slack, double ramp);
-// Share of the full evaluation that a guard asks for: 0 within [lo, hi], a smoothstep over the ramp, 1
-// beyond; NaN gives 1. Stateless, like the score's.
+// Share of the full evaluation that a guard asks for: 0 within [lo, hi] and up to a tenth of the ramp beyond, a smoothstep
+// over the rest of it, 1 from there on; NaN gives 1. Stateless, like the score's. A share of a thousandth costs a
+// full evaluation, and shows nothing.
+inline constexpr double kForgivenOfRamp = 0.1;
 inline double GuardWeight(double lo, double hi, double ramp, double value) {
-  const double outside = value < lo ? lo - value : value - hi;
+  const double outside = value < lo ? lo - value : value - hi, forgiven = kForgivenOfRamp * ramp;
   if (outside <= 0) return 0;
   if (!(outside < ramp)) return 1;
-  return Smoothstep(outside / ramp);
+  return outside <= forgiven ? 0 : Smoothstep((outside - forgiven) / (ramp - forgiven));
 }
 // "head.rotateX = 1.2 is outside its trained range [-0.5, 0.5]"
 std::string OutsideMessage(const TrainedRange& range, double value);

@@ -91,6 +91,7 @@ std::string TrainingJson(const TrainingRecord& r) {
                    {"error", r.worst.error}}}};
   if (!r.limited.empty()) object["limited"] = r.limited;
   if (!r.at_rest.empty()) object["at_rest"] = r.at_rest;
+  if (!r.by_clips_alone.empty()) object["by_clips_alone"] = r.by_clips_alone;
   for (const auto& [clip, times] : r.learnt) object["learnt"].push_back({{"clip", clip}, {"times", times}});
   for (const Miss& pose : r.learnt_poses)
     object["learnt_poses"].push_back({{"clip", pose.clip}, {"time", pose.time}, {"controls", pose.controls}});
@@ -137,6 +138,7 @@ TrainingRecord ParseTraining(const std::string& text) {
   r.warning = words("warning");
   r.limited = words("limited");
   r.at_rest = NamesIn(object, "at_rest");
+  r.by_clips_alone = NamesIn(object, "by_clips_alone");
   if (object.contains("asked") && object["asked"].is_object()) {
     const json& asked = object["asked"];
     r.asked = {count_in(asked, "samples"), count_in(asked, "calibration"),

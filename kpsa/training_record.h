@@ -44,6 +44,8 @@ struct TrainingRecord {
   std::string limited;  // what was left out for want of time
   // Controls that the subspace does not follow, as people write their plugs: frames that move them miss.
   std::vector<std::string> at_rest = {};
+  // Signals that clips move and no control does, as people write their plugs: what other clips do with them is not known.
+  std::vector<std::string> by_clips_alone = {};
   // What was tried, where there was a choice: its cues, the rows that these measure, and what judges say.
   struct Tried {
     std::string what;

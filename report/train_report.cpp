@@ -64,6 +64,7 @@ std::string TrainJson(const TrainResult& r) {
                              {"seconds", r.seconds},
                              {"limited", r.record.limited},
                              {"at_rest", r.record.at_rest},
+                             {"by_clips_alone", r.record.by_clips_alone},
                              {"held_out",
                               {{"poses", r.record.calibration_poses},
                                {"rms", r.record.held_out_rms},
@@ -103,6 +104,16 @@ std::string TrainJson(const TrainResult& r) {
 
 namespace {
 
+// The first ones, and how many more there are.
+std::string FirstNames(const std::vector<std::string>& names) {
+  constexpr std::size_t kNamed = 6;
+  return fmt::format(
+      "{}{}",
+      fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(std::min(kNamed, names.size())),
+                ", "),
+      names.size() > kNamed ? fmt::format(" and {} more", names.size() - kNamed) : "");
+}
+
 // JSON's quotes are YAML's.
 std::string QuotedYaml(const std::string& text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -135,16 +146,16 @@ std::string TrainText(const TrainResult& r) {
   text +=
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
-  if (const std::vector<std::string>& left = r.record.at_rest; !left.empty()) {
-    constexpr std::size_t kNamed = 6;
+  if (const std::vector<std::string>& left = r.record.at_rest; !left.empty())
     text += fmt::format(
         "left at rest, as no clip moves them, and following them costs much or fails (frames that move them "
-        "miss): "
-        "{}{}\n",
-        fmt::join(left.begin(), left.begin() + static_cast<std::ptrdiff_t>(std::min(kNamed, left.size())),
-                  ", "),
-        left.size() > kNamed ? fmt::format(" and {} more", left.size() - kNamed) : "");
-  }
+        "miss): {}\n",
+        FirstNames(left));
+  if (const std::vector<std::string>& alone = r.record.by_clips_alone; !alone.empty())
+    text += fmt::format(
+        "moved by clips and by no control, so known as these clips do it alone: {}; another clip that parts "
+        "what moves together here may be wrong and hit: name them under `controls:`, as kpsa init does\n",
+        FirstNames(alone));
   if (!r.record.limited.empty()) text += fmt::format("in the time and memory given: {}\n", r.record.limited);
   for (const TrainingRecord::Tried& one : r.record.tried) {
     text += fmt::format(

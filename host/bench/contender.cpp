@@ -132,11 +132,19 @@ void Contender::NoteClip(const std::string& clip, bool still) {
     const std::string part = clip.substr(begin, end - begin);
     begin = end + 3;
     for (const AppliedSubspace& one : applied) {
-      const std::vector<std::string> trained = ParseTraining(one.subspace->training).clips;
-      if (std::find(trained.begin(), trained.end(), MakeTarget(open->rig, one.entry).within.Inner(part)) ==
-          trained.end())
+      const TrainingRecord record = ParseTraining(one.subspace->training);
+      const std::string inner = MakeTarget(open->rig, one.entry).within.Inner(part);
+      const auto learnt =
+          std::ranges::find(record.learnt, inner, [](const auto& clip) { return std::string(clip.first); });
+      if (std::ranges::find(record.clips, inner) != record.clips.end()) {
+        result.notes.push_back(
+            fmt::format("{} was trained on: its errors say nothing about new frames", part));
+      } else if (learnt != record.learnt.end()) {
+        result.notes.push_back(fmt::format("{} frames of {} were learnt: the clip says little about new ones",
+                                           learnt->second.size(), part));
+      } else {
         continue;
-      result.notes.push_back(fmt::format("{} was trained on: its errors say nothing about new frames", part));
+      }
       break;
     }
   }

@@ -1,6 +1,7 @@
 #include "host/checks/playback_times.h"
 
 #include <algorithm>
+#include <chrono>
 #include <numeric>
 #include <optional>
 
@@ -16,7 +17,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kPlaybackBlocks = 5, kPlaybackBlockFrames = 8;
-constexpr int kPlaybackRuns = 5;
+constexpr int kPlaybackRuns = 5, kFewestRuns = 3;
+constexpr double kEnoughSeconds = 0.25;  // of a block's runs: what takes longer is told well by few of them
 
 // Sums over blocks.
 struct PlaybackSums {
@@ -39,7 +41,13 @@ Status TimeBlock(const Rig& rig, const PlaybackPlans& plans, const std::vector<d
   const SideOptions options{.parallel = light, .frames = times.size(), .cancel = watch.cancel};
   Side full(rig, plans.full, options), accelerated(rig, plans.accelerated, options);
   std::vector<char> hit(times.size());
-  for (int run = 0; run < (light ? 1 : kPlaybackRuns); ++run) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto enough = [&](int runs) {
+    if (light) return runs >= 1;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return runs >= kPlaybackRuns || (runs >= kFewestRuns && seconds > kEnoughSeconds);
+  };
+  for (int run = 0; !enough(run); ++run) {
     full.StartAgain();
     KPSA_RETURN_IF_ERROR(full.Turn(times, 0, times.size()));
     // Hits are short: so few of them would be timed while the caches are still those of the full side

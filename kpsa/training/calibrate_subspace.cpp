@@ -22,6 +22,7 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
 constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it took to train on
 constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
+constexpr double kTrying = 300;   // poses that the caller evaluates when all is done, about
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kCalibrationSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
                         kTrialSeed = 0x6a09e667f3bcc908ull, kManySeed = 0xa54ff53a5f1d36f1ull;
@@ -255,18 +256,32 @@ void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, Tr
   record->worst.time = clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
 }
 
+double Rate(const TrainOptions& options) { return std::clamp(options.violation_rate, 1e-4, 0.5); }
+// Of a kind: what the rate asks for, and the fewest that can promise it.
+std::size_t WantedCalibrating(const TrainOptions& options) {
+  return static_cast<std::size_t>(std::clamp(8.0 / Rate(options), 400.0, 1000.0));
+}
+std::size_t FewestCalibrating(const TrainOptions& options) {
+  const double fewest = kSpared * std::log(1 - kCalibrationConfidence) / std::log1p(-Rate(options));
+  return std::min(WantedCalibrating(options), static_cast<std::size_t>(std::ceil(fewest)));
+}
+
 }  // namespace
 
+double LeastCalibrationSeconds(double pose_seconds, const TrainOptions& options) {
+  const std::size_t each =
+      options.calibration_poses > 0 ? options.calibration_poses : FewestCalibrating(options);
+  return pose_seconds * (2 * kPoseKinds * kJudging * static_cast<double>(each) + kTrying);
+}
+
 CalibrationSize CalibrationWithin(double pose_seconds, const TrainOptions& options, TimeLimit* limit) {
+  limit->Reserve(0);
   if (options.calibration_poses > 0) return {options.calibration_poses, true};
-  const double rate = std::clamp(options.violation_rate, 1e-4, 0.5);
-  const auto wanted = static_cast<std::size_t>(std::clamp(8.0 / rate, 400.0, 1000.0));
+  const std::size_t wanted = WantedCalibrating(options);
   const auto within = static_cast<std::size_t>(
       std::clamp(limit->left() / (2 * kPoseKinds * kJudging * pose_seconds), 0.0, 1e9));
   if (within > 2 * wanted) return {wanted, true};
-  const double fewest = kSpared * std::log(1 - kCalibrationConfidence) / std::log1p(-rate);
-  const std::size_t poses =
-      std::clamp(within, std::min(wanted, static_cast<std::size_t>(std::ceil(fewest))), wanted);
+  const std::size_t poses = std::clamp(within, FewestCalibrating(options), wanted);
   if (poses < wanted)
     limit->LeaveOut(fmt::format("{} of {} poses of a kind to calibrate with", poses, wanted));
   limit->LeaveOut("no ranges beyond the trained ones");

@@ -16,7 +16,10 @@ struct CalibrationSize {
 // As many poses as the options ask for, or as their rate needs (8 / violation_rate, 400 to 1,000). Where
 // there is no time for these, and nobody asks for a number: no margins, and fewer poses, but more than the
 // fewest that can promise this rate at all. pose_seconds: what a pose took to train on.
+// What was set aside for it is free again.
 CalibrationSize CalibrationWithin(double pose_seconds, const TrainOptions& options, TimeLimit* limit);
+// How long the least of these takes, about, and trying what was made.
+double LeastCalibrationSeconds(double pose_seconds, const TrainOptions& options);
 
 // All references must outlive it.
 struct Calibrator {

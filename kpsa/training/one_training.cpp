@@ -6,6 +6,7 @@
 
 #include "kpsa/training/finer_subspaces.h"
 #include "kpsa/training/mend_tiles.h"
+#include "kpsa/training/training_signals.h"
 #include "kpsa/training/untold_controls.h"
 #include "kpsa/training/whole_subspace.h"
 
@@ -153,6 +154,12 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
   KPSA_RETURN_IF_ERROR(setup.Prepare());
+  if (!rig.controls.empty() && !setup.of_light()) {
+    Result<std::vector<std::string>> alone =
+        MovedByClipsAlone(setup.rig, &setup.compiler, clips, setup.guards);
+    if (!alone.ok()) return alone.status();
+    record.by_clips_alone = std::move(*alone);
+  }
 
   // Poses
   TrainingPoses poses(setup.layout);

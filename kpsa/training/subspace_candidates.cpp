@@ -309,16 +309,20 @@ Status SubspaceCandidates::AddPosesForTiles() {
     return Status();
   }
   modes_poses_ = poses->poses.poses();
+  const TrainingSampler& sampler = *setup->trained_sampler;
+  const std::size_t all = sampler.MoreForTiles(), within = poses->SampledWithin(setup->limit, all);
+  if (within < all) setup->limit.LeaveOut(fmt::format("{} of {} more poses for cues of tiles", within, all));
+  const double share = all == 0 ? 1 : static_cast<double>(within) / static_cast<double>(all);
   PoseMatrix more(setup->layout);
-  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
+  KPSA_RETURN_IF_ERROR(sampler.AddMore(poses->poses, share, &more));
   const std::size_t drawn = more.poses();
-  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddFolded(poses->poses.poses() + drawn, &more));
+  KPSA_RETURN_IF_ERROR(sampler.AddFolded(poses->poses.poses() + drawn, share, &more));
   folded_begin_ = modes_poses_ + drawn, folded_ = more.poses() - drawn;
   record->sampled_poses += more.poses();
   ranges_of_tiles = RangeFinder(setup->layout);
   ranges_of_tiles.Widen(more);
   PoseMatrix ends(setup->layout);
-  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddEnds(&ends));
+  KPSA_RETURN_IF_ERROR(sampler.AddEnds(&ends));
   ranges_of_tiles.Widen(ends);
   if (more.poses() > 0) more.Subtract(modes->pca.mean);
   poses->poses.Append(std::move(more));

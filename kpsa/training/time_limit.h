@@ -15,13 +15,15 @@ class TimeLimit {
  public:
   explicit TimeLimit(double seconds) : seconds_(seconds) {}  // infinity: none
   double elapsed() const;                                    // seconds since it was made
-  double left() const { return seconds_ - elapsed(); }
+  double left() const { return seconds_ - reserved_ - elapsed(); }
+  // Sets so many seconds of it aside, in the place of those before: what has to come at the end.
+  void Reserve(double seconds) { reserved_ = seconds; }
   // What is left out for want of time, once each: told at the end.
   void LeaveOut(const std::string& what);
   std::string left_out() const;
 
  private:
-  double seconds_;
+  double seconds_, reserved_ = 0;
   std::vector<std::string> left_out_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kpsa/training/calibrate_subspace.h"
 #include "kpsa/training/cue_products.h"
 #include "kpsa/training/miss_samples.h"
 #include "kpsa/training/signal_noise.h"
@@ -17,14 +18,18 @@ constexpr double kToSample =
     0.25;  // of the time that is left, where there is a limit: samples take no more of it,
 constexpr std::size_t kLeastSampled = 250;  // but these are drawn in any case
 
-// How many there is time for, after so many poses of clips.
-std::size_t SamplesWithin(const TimeLimit& limit, double seconds, std::size_t poses) {
-  if (!std::isfinite(limit.left()) || poses == 0) return std::numeric_limits<std::size_t>::max();
-  const double within = kToSample * limit.left() * static_cast<double>(poses) / std::max(seconds, 1e-9);
-  return std::max(kLeastSampled, static_cast<std::size_t>(std::clamp(within, 0.0, 1e9)));
+// How many there is time for, where one takes so long.
+std::size_t SamplesWithin(const TimeLimit& limit, double pose_seconds) {
+  if (!std::isfinite(limit.left())) return std::numeric_limits<std::size_t>::max();
+  const double within = kToSample * limit.left() / std::max(pose_seconds, 1e-9);
+  return static_cast<std::size_t>(std::clamp(within, 0.0, 1e9));
 }
 
 }  // namespace
+
+std::size_t TrainingPoses::SampledWithin(const TimeLimit& limit, std::size_t samples) const {
+  return std::min(samples, SamplesWithin(limit, pose_seconds));
+}
 
 Status RecordPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* record) {
   const double before = setup->limit.elapsed();
@@ -56,8 +61,11 @@ Status RecordPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* reco
   }
   KPSA_RETURN_IF_ERROR(setup->sampler->LearnHowControlsMove());
   if (setup->options.by_tile_as_before) KPSA_RETURN_IF_ERROR(setup->trained_sampler->LearnHowControlsMove());
-  const std::size_t wanted = setup->options.samples,
-                    most = SamplesWithin(setup->limit, setup->limit.elapsed() - before, to->poses.poses());
+  const double of_clips = setup->limit.elapsed() - before;
+  const std::size_t recorded = to->poses.poses(), wanted = setup->options.samples;
+  const double of_one = recorded == 0 ? 0 : of_clips / static_cast<double>(recorded);
+  setup->limit.Reserve(LeastCalibrationSeconds(of_one, setup->options));
+  const std::size_t most = std::max(kLeastSampled, SamplesWithin(setup->limit, of_one));
   const Result<std::size_t> sampled = setup->trained_sampler->AddTraining(most, &to->poses);
   if (!sampled.ok()) return sampled.status();
   to->not_sampled = wanted - std::min(wanted, most);

@@ -14,6 +14,9 @@ namespace kpsa::engine {
 struct TrainingPoses {
   explicit TrainingPoses(const PoseLayout& layout) : poses(layout), judges(layout) {}
 
+  // How many of so many samples there is time to record, by what those took that are here.
+  std::size_t SampledWithin(const TimeLimit& limit, std::size_t samples) const;
+
   PoseMatrix poses;
   PoseMatrix judges;                // new ones, where cues have places to choose from
   std::vector<int> judge_kinds;     // PoseKind of each

@@ -81,11 +81,19 @@ Result<std::size_t> TrainingSampler::AddTraining(std::size_t most, PoseMatrix* p
   return count;
 }
 
-Status TrainingSampler::AddMore(const PoseMatrix& beside, PoseMatrix* poses) const {
+std::size_t TrainingSampler::SamplesOf(double share) const {
+  return static_cast<std::size_t>(share * static_cast<double>(options_.samples));
+}
+
+std::size_t TrainingSampler::MoreForTiles() const {
+  return options_.samples + SamplesOf(kTogether) + SamplesOf(kFolded);
+}
+
+Status TrainingSampler::AddMore(const PoseMatrix& beside, double share, PoseMatrix* poses) const {
   const std::uint64_t seed = options_.seed ^ 0xa54ff53a5f1d36f1ull;
-  const std::size_t room = RoomBeside(beside.poses()), count = std::min(options_.samples, room);
+  const std::size_t room = RoomBeside(beside.poses()), count = std::min(SamplesOf(share), room);
   KPSA_RETURN_IF_ERROR(AddSampled(count, seed, poses));
-  const auto together = static_cast<std::size_t>(kTogether * static_cast<double>(options_.samples));
+  const std::size_t together = SamplesOf(kTogether * share);
   std::vector<SampledPose> at_once = PosesTogether(drawn_, std::min(together, room - count), ~seed);
   AddTilts(rig_.controls, drawn_.size(), ~seed, &at_once);
   return recorder_->AddSamples(at_once, clips_, poses);
@@ -97,10 +105,9 @@ std::vector<SampledPose> TrainingSampler::Folded(std::size_t count, std::uint64_
   return folded;
 }
 
-Status TrainingSampler::AddFolded(std::size_t beside, PoseMatrix* poses) const {
-  const auto wanted = static_cast<std::size_t>(kFolded * static_cast<double>(options_.samples));
-  return recorder_->AddSamples(
-      Folded(std::min(wanted, RoomBeside(beside)), options_.seed ^ 0x510e527fade682d1ull), clips_, poses);
+Status TrainingSampler::AddFolded(std::size_t beside, double share, PoseMatrix* poses) const {
+  const std::size_t count = std::min(SamplesOf(kFolded * share), RoomBeside(beside));
+  return recorder_->AddSamples(Folded(count, options_.seed ^ 0x510e527fade682d1ull), clips_, poses);
 }
 
 Status TrainingSampler::AddEnds(PoseMatrix* poses) const {

@@ -37,11 +37,13 @@ class TrainingSampler {
   // Sweeps, and as many samples as the options want and memory holds: the sampler's kind, and some of the
   // others, but no more than `most`. Light: no others. How many samples were drawn.
   Result<std::size_t> AddTraining(std::size_t most, PoseMatrix* poses) const;
+  // How many poses these two add, where there is room for all.
+  std::size_t MoreForTiles() const;
   // More samples, of another seed, as far as there is room beside the poses; and PosesTogether, for tiles with
-  // cues of their own.
-  Status AddMore(const PoseMatrix& beside, PoseMatrix* poses) const;
-  // PosesFolded, as many as there is room for beside so many poses.
-  Status AddFolded(std::size_t beside, PoseMatrix* poses) const;
+  // cues of their own. share: of all these.
+  Status AddMore(const PoseMatrix& beside, double share, PoseMatrix* poses) const;
+  // PosesFolded, as many as there is room for beside so many poses; likewise.
+  Status AddFolded(std::size_t beside, double share, PoseMatrix* poses) const;
   // PosesFolded, not recorded.
   std::vector<SampledPose> Folded(std::size_t count, std::uint64_t seed) const;
   // Of which only the values of transforms are of use, not the points.
@@ -53,6 +55,7 @@ class TrainingSampler {
   bool of_light() const { return rig_.target.colors; }
   std::size_t PoseBytes() const { return sizeof(float) * layout_.columns(); }
   std::size_t RoomBeside(std::size_t poses) const;
+  std::size_t SamplesOf(double share) const;
   Status AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) const;
 
   const TrainingRig& rig_;

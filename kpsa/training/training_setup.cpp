@@ -48,13 +48,15 @@ Status TrainingSetup::Prepare() {
       FindTrainingSignals(rig, &compiler, clips, measures && !options.without.relative_matrices);
   if (!found.ok()) return found.status();
   guards = std::move(found->watched);
-  std::vector<Signal> signals = guards;
-  signals.insert(signals.end(), found->relative.begin(), found->relative.end());
   for (const PlugRef& space : rig.target.space) {
     const Result<Value> rest = compiler.Rest(*rig.graph, space);
     if (!rest.ok()) return rest.status();
     inverse_rest_stretch = InverseRestStretch(rest->get<Matrix4>());
   }
+  KPSA_RETURN_IF_ERROR(
+      LeaveOutCarried(rig, &compiler, clips, inverse_rest_stretch, options.tolerance, &found->relative));
+  std::vector<Signal> signals = guards;
+  signals.insert(signals.end(), found->relative.begin(), found->relative.end());
   recorder = std::make_unique<PoseRecorder>(rig, &compiler, std::move(candidates), std::move(signals),
                                             inverse_rest_stretch, options.tolerance);
   if (!rig.some.empty()) {

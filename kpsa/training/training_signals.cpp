@@ -4,6 +4,9 @@
 #include <set>
 #include <utility>
 
+#include "kpsa/training/carried.h"
+#include "kpsa/training/space_points.h"
+
 namespace kpsa::engine {
 namespace {
 
@@ -25,6 +28,24 @@ Result<std::set<Index>> NodesOf(const TrainingRig& rig, Compiler* compiler,
   std::set<Index> nodes;
   for (const Compiler::Stepped& stepped : *steps) nodes.insert(stepped.node.index);
   return nodes;
+}
+
+// Of the box of all points as the rig is now, in the space.
+Result<double> Diagonal(const TrainingRig& rig, Compiler* compiler, const Matrix4& inverse_rest_stretch) {
+  const Result<std::shared_ptr<const Plan>> plan =
+      compiler->Compile(*rig.graph, SpacePointsRequest(rig.target));
+  if (!plan.ok()) return plan.status();
+  Evaluator evaluator(*plan);
+  KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
+  std::vector<double> points;
+  SpacePoints(evaluator, rig.target, inverse_rest_stretch, &points);
+  Double3 lo, hi;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto axis = static_cast<int>(i % 3);
+    lo[axis] = i < 3 ? points[i] : std::min(lo[axis], points[i]);
+    hi[axis] = i < 3 ? points[i] : std::max(hi[axis], points[i]);
+  }
+  return Length(hi - lo);
 }
 
 }  // namespace
@@ -70,6 +91,57 @@ Result<TrainingSignals> FindTrainingSignals(const TrainingRig& rig, Compiler* co
     std::ranges::sort(*list, {}, &Signal::name);
   KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
   return signals;
+}
+
+Result<std::vector<std::string>> MovedByClipsAlone(const TrainingRig& rig, Compiler* compiler,
+                                                   const std::vector<TrainingClip>& clips,
+                                                   const std::vector<Signal>& watched) {
+  std::set<std::string> by_clips, by_controls;
+  for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
+    KPSA_RETURN_IF_ERROR(rig.Play(clips, clip));
+    std::vector<PlugRef> varying{rig.time};
+    if (clip < 0) varying = rig.Varying(false);
+    for (const Signal& signal : watched) {
+      std::set<std::string>& by = clip < 0 ? by_controls : by_clips;
+      if (by.contains(signal.name) || (clip >= 0 && by_controls.contains(signal.name))) continue;
+      const Result<std::set<Index>> nodes = NodesOf(rig, compiler, {signal.plug}, varying);
+      if (!nodes.ok()) return nodes.status();
+      if (!nodes->empty() || std::ranges::find(varying, signal.plug) != varying.end()) by.insert(signal.name);
+    }
+  }
+  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  std::vector<std::string> alone;
+  for (const Signal& signal : watched) {
+    if (by_clips.contains(signal.name)) alone.push_back(rig.graph->AuthoredName(signal.plug));
+  }
+  return alone;
+}
+
+Status LeaveOutCarried(const TrainingRig& rig, Compiler* compiler, const std::vector<TrainingClip>& clips,
+                       const Matrix4& inverse_rest_stretch, double tolerance, std::vector<Signal>* relative) {
+  if (rig.target.space.empty()) return Status();
+  const Graph& graph = *rig.graph;
+  const std::vector<NodeId> chain = ParentsFrom(graph, rig.target.space[0].node);
+  // Of the chain, what is below that which carries both
+  const auto between = [&](const Signal& signal) {
+    const std::vector<NodeId> up = ParentsFrom(graph, signal.plug.node);
+    const auto both = std::ranges::find_first_of(chain, up, {}, &NodeId::index, &NodeId::index);
+    return std::span(chain.begin(), both);
+  };
+  if (std::ranges::all_of(*relative, [&](const Signal& signal) { return between(signal).empty(); }))
+    return Status();
+  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  const Result<double> diagonal = Diagonal(rig, compiler, inverse_rest_stretch);
+  if (!diagonal.ok()) return diagonal.status();
+  const Result<Carried> carried =
+      FindCarried(rig, compiler, clips, {}, inverse_rest_stretch, *diagonal, tolerance);
+  if (!carried.ok()) return carried.status();
+  std::erase_if(*relative, [&](const Signal& signal) {
+    return std::ranges::any_of(between(signal), [&](NodeId node) {
+      return std::ranges::find(carried->rigid, graph.name(node)) != carried->rigid.end();
+    });
+  });
+  return Status();
 }
 
 }  // namespace kpsa::engine

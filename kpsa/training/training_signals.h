@@ -17,4 +17,14 @@ struct TrainingSignals {
 Result<TrainingSignals> FindTrainingSignals(const TrainingRig& rig, Compiler* compiler,
                                             const std::vector<TrainingClip>& clips, bool with_relative);
 
+// Of the watched ones those that clips move and no control does, as people write their plugs. No clip plays after.
+Result<std::vector<std::string>> MovedByClipsAlone(const TrainingRig& rig, Compiler* compiler,
+                                                   const std::vector<TrainingClip>& clips,
+                                                   const std::vector<Signal>& watched);
+
+// Takes out the matrices that change where a transform turns that carries the points rigidly (kpsa/training/carried.h): an
+// ancestor of the space, or what hangs from one. No point follows them, and no guard watches what turns. No clip plays after.
+Status LeaveOutCarried(const TrainingRig& rig, Compiler* compiler, const std::vector<TrainingClip>& clips,
+                       const Matrix4& inverse_rest_stretch, double tolerance, std::vector<Signal>* relative);
+
 }  // namespace kpsa::engine

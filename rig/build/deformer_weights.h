@@ -42,7 +42,9 @@ using NamePairs = std::vector<std::pair<std::string, std::string>>;  // ".L", ".
 
 struct MirrorOptions {
   enum class From { kLeft, kRight, kBoth };  // left: above 0; both: the two sides change places
-  int axis = 0;                              // of the mesh's own space; the plane goes through its origin
+  // Of the mesh's own space, or of the world where fewer points have no partner in that: of positions that are stored
+  // as whole numbers the mesh's own origin is nowhere in particular. The plane goes through the origin.
+  int axis = 0;
   From from = From::kLeft;
   NamePairs names = {};                  // parts of joints' names on the left and on the right
   std::optional<double> tolerance = {};  // metres; unset: 1/1000 of the mesh's diagonal

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/matrix.h"
 #include "base/triangle_tree.h"
+#include "graph/compiler.h"
 #include "rig/build/deformer_weights.h"
 #include "rig/character/mesh_weights.h"
 
@@ -15,8 +17,20 @@ constexpr double kDefaultTolerance = 1e-3;
 // Where the points are, where those are that share triangles with them, and who is the nearest to a place.
 class Partners {
  public:
-  Partners(const Mesh& mesh, int axis)
-      : rest_(mesh.data().rest.view()), axis_(axis), around_(rest_.count), own_(3 * rest_.count) {
+  // to: where the rest places are mirrored.
+  Partners(const Mesh& mesh, const Matrix4& to, int axis)
+      : places_(mesh.point_count()),
+        rest_(std::as_const(places_).view()),
+        axis_(axis),
+        around_(rest_.count),
+        own_(3 * rest_.count) {
+    const ConstPointsView rest = mesh.data().rest.view();
+    const PointsView places = places_.view();
+    for (std::size_t p = 0; p < rest.count; ++p) {
+      const Double3 at = TransformPoint(to, {double{rest.x[p]}, double{rest.y[p]}, double{rest.z[p]}});
+      places.x[p] = static_cast<float>(at.x), places.y[p] = static_cast<float>(at.y);
+      places.z[p] = static_cast<float>(at.z);
+    }
     std::vector<double> count(rest_.count, 0.0);
     const std::vector<Index>& triangles = mesh.data().triangles;
     for (std::size_t t = 0; t < triangles.size(); t += 3) {
@@ -68,6 +82,7 @@ class Partners {
     return place;
   }
 
+  PointBuffer places_;
   ConstPointsView rest_;
   int axis_;
   std::vector<Double3> around_;
@@ -139,15 +154,24 @@ std::string MirroredName(const std::string& name, const NamePairs& pairs,
   return name;
 }
 
-Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, const MirrorOptions& options) {
-  const CharacterMesh& mesh = *of.mesh;
-  Partners partners(mesh.mesh(), options.axis);
-  MirroredWeights result;
+namespace {
+
+// Who takes weights from whom, over the plane of one space.
+struct Paired {
+  std::vector<Source> sources;
+  std::vector<bool> unmatched;
+  std::size_t unmatched_count = 0;
+  double farthest = 0, tolerance = 0;
+};
+
+Result<Paired> PairPoints(const CharacterMesh& mesh, const Matrix4& to, const MirrorOptions& options) {
+  Partners partners(mesh.mesh(), to, options.axis);
+  Paired result;
   result.tolerance = options.tolerance.value_or(partners.Diagonal() * kDefaultTolerance);
-  std::vector<Source> sources(mesh.mesh().point_count());
-  std::vector<bool> unmatched(sources.size(), false);
-  for (Index p = 0; p < sources.size(); ++p) {
-    sources[p] = {Source::kKeeps, p};
+  result.sources.resize(mesh.mesh().point_count());
+  result.unmatched.resize(result.sources.size(), false);
+  for (Index p = 0; p < result.sources.size(); ++p) {
+    result.sources[p] = {Source::kKeeps, p};
     double distance = 0;
     const Index partner = partners.Find(p, result.tolerance, &distance);
     if (partner == kNoIndex) return Status::Invalid("the rest points of {} are not finite", mesh.name);
@@ -158,10 +182,47 @@ Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, co
     if (side > 0 && (partner != p || far)) continue;
     // Its own partner, but not in the plane: nobody is on the other side
     if (partner != p || !far)
-      sources[p] = {partner == p && !flips ? Source::kShares : Source::kTakes, partner};
-    unmatched[p] = far;
+      result.sources[p] = {partner == p && !flips ? Source::kShares : Source::kTakes, partner};
+    result.unmatched[p] = far, result.unmatched_count += far;
     result.farthest = std::max(result.farthest, distance);
   }
+  return result;
+}
+
+// Where the rest pose has the mesh, by the joint that its first point weighs on.
+Result<Matrix4> WorldFromMesh(const Rig& rig, const CharacterMesh& mesh) {
+  const bool skinned = mesh.influences != nullptr && !mesh.influences->joints().empty();
+  const Index joint = skinned ? mesh.influences->joints().front() : 0;
+  const NodeId node = skinned ? mesh.influence_nodes[joint] : mesh.transform;
+  Compiler compiler;
+  const Result<Value> world =
+      compiler.Rest(*rig.graph, {node, rig.graph->def(node).FindAttribute("worldMatrix"), -1, -1});
+  if (!world.ok()) return world.status();
+  return skinned ? world->get<Matrix4>() * mesh.inverse_binds[joint] : world->get<Matrix4>();
+}
+
+// In the mesh's own space, as long as things are in the world; or where that leaves fewer without a partner, in the
+// world: the middle of numbers that are stored as whole ones (KHR_mesh_quantization) is not that of the character.
+Result<Paired> PairPoints(const Rig& rig, const CharacterMesh& mesh, const MirrorOptions& options) {
+  const Result<Matrix4> world = WorldFromMesh(rig, mesh);
+  if (!world.ok()) return world.status();
+  const double volume = std::abs(Determinant3(*world)), scale = volume > 0 ? std::cbrt(volume) : 1;
+  Result<Paired> own = PairPoints(mesh, Scaling({scale, scale, scale}), options);
+  if (!own.ok() || own->unmatched_count == 0 || !(volume > 0)) return own;
+  Result<Paired> there = PairPoints(mesh, *world, options);
+  return there.ok() && there->unmatched_count < own->unmatched_count ? std::move(there) : std::move(own);
+}
+
+}  // namespace
+
+Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, const MirrorOptions& options) {
+  const CharacterMesh& mesh = *of.mesh;
+  const Result<Paired> paired = PairPoints(rig, mesh, options);
+  if (!paired.ok()) return paired.status();
+  const std::vector<Source>& sources = paired->sources;
+  const std::vector<bool>& unmatched = paired->unmatched;
+  MirroredWeights result;
+  result.tolerance = paired->tolerance, result.farthest = paired->farthest;
   for (Index v = 0; v < mesh.vertex_count; ++v) {
     if (unmatched[mesh.mesh().data().vertex_to_point[v]]) result.unmatched.push_back(v);
   }

@@ -88,6 +88,7 @@ TEST(Arguments, UsageMistakes) {
       {eval({"--accelerate", "--tolerance", "nan"}), 2, "--tolerance"},
       {eval({"--accelerate", "--tolerance", "all"}), 2, "or any"},
       {{"train", kHello, "--tolerance", "any", "-o", "out.kpsa"}, 2, "--tolerance"},
+      {{"train", kHello, "--tolerance", "0", "-o", "out.kpsa"}, 2, "a length above 0"},
       {eval({"--accelerate", "--violation-rate", "2"}), 2, "0 to 1"},
       {eval({"--blender"}), 2, ".pc2"},
       {{"eval", kHello, "-o", "out.abc"}, 2, ".usda"},

@@ -61,6 +61,11 @@ TEST_F(Learning, WhatMissedHitsAfterwardsAndStaysLearnt) {
   EXPECT_TRUE(record.clips.empty()) << "the rig's training clips";
   EXPECT_EQ(record.asked.samples, 400u);
   EXPECT_EQ(record.calibration_poses, 1600u) << "new ones of each kind";
+  const ProcessResult bench =
+      Run({"bench", "hello.yaml", "--kpsa", "new.kpsa", "--clip", "sway", "--runs", "1"});
+  EXPECT_NE(bench.err.find(" frames of sway were learnt: the clip says little about new ones"),
+            std::string::npos)
+      << bench.err;
   // Again there is nothing new; the file of its own is the same
   const json again = Learn({"--kpsa", "new.kpsa", "--clip", "sway", "-o", "again.kpsa"});
   EXPECT_EQ(again["learnt"], 0);

@@ -5,6 +5,7 @@
 
 #include "host/rig_training.h"
 #include "kpsa/training/training_setup.h"
+#include "kpsa/training/training_signals.h"
 #include "rig/build/writer.h"
 #include "tests/cli/rig_run.h"
 #include "tests/support/moving_character.h"
@@ -100,6 +101,79 @@ TEST(TileCandidates, JointsThatCuesAreMeasuredByAreGuarded) {
   const RunFrame frame = turned(by_antenna, 20);
   EXPECT_EQ(frame.full_weight, 1) << frame.text;
   EXPECT_NE(frame.text.find("antenna.matrix"), std::string::npos) << frame.text;
+}
+
+// The relative matrices of a strip on `root` and `tip` under a joint `above`, that its skin lists. `base`: the node that
+// the points weigh on that do not weigh on the tip. The space is the root.
+std::vector<std::string> RelativeMatricesUnder(const char* name, int base) {
+  MovingCharacter character;
+  nlohmann::json& root = character.builder.root;
+  character.builder.Push("nodes", {{"name", "above"}, {"children", {1}}});
+  root["scenes"][0]["nodes"] = {0, 3};
+  std::vector<float> bind(48, 0.0f);
+  for (std::size_t k = 0; k < 12; ++k) bind[16 * (k / 4) + 5 * (k % 4)] = 1;
+  bind[16 + 12] = -0.5f;
+  root["skins"][0]["joints"] = {base, 2, base == 1 ? 3 : 1};
+  root["skins"][0]["inverseBindMatrices"] = character.builder.Accessor(bind, "MAT4");
+  character.Swing("talk", 40, 2);
+  TemporaryFolder folder;
+  folder.Write("m.gltf", character.builder.Text());
+  Result<Rig> rig = LoadRig(AcceleratedRegistry(), folder.Write("m.yaml", R"(kpsa: 1
+character: m.gltf
+controls:
+  root.rotateZ: {min: -3deg, max: 3deg}
+  tip.rotateZ: {min: -30deg, max: 30deg}
+accelerate:
+  strip: {points: [strip@skin], space: root, subspace: m.kpsa, tolerance: 1mm, train: {clips: [talk], samples: 60}}
+)"),
+                            {});
+  EXPECT_TRUE(rig.ok()) << name << ": " << rig.status().ToString();
+  if (!rig.ok()) return {};
+  const std::vector<TrainingClip> clips{{"talk", {0, 0.5, 1, 1.5}}};
+  const TrainOptions options;
+  TrainingSetup setup(MakeTrainingRig(&*rig, rig->accelerate.at(0)), clips, options);
+  const Status prepared = setup.Prepare();
+  EXPECT_TRUE(prepared.ok()) << name << ": " << prepared.ToString();
+  std::vector<std::string> relative;
+  if (!prepared.ok()) return relative;
+  for (const Signal& signal : setup.recorder->signals()) {
+    if (signal.relative) relative.push_back(signal.name);
+  }
+  return relative;
+}
+
+// Nothing guards what turns the space with all points: seen from it, what stands above it turns the other way, and a tile
+// that measured that was off by as many tolerances as one liked, all frames hits.
+TEST(TileCandidates, WhatTurnsWhereTheSpaceDoesIsMeasuredWherePointsStayBehindAlone) {
+  EXPECT_EQ(RelativeMatricesUnder("a joint that moves no point", 1),
+            (std::vector<std::string>{"root.worldMatrix", "tip.worldMatrix"}));
+  const std::vector<std::string> weighs = RelativeMatricesUnder("points that weigh on it", 3);
+  EXPECT_NE(std::ranges::find(weighs, "above.worldMatrix"), weighs.end());
+}
+
+// What a clip moves that no control does is known as the clips do it, and named.
+TEST(TileCandidates, WhatClipsAloneMoveIsNamed) {
+  MovingCharacter character;
+  character.Swing("talk", 40, 2);
+  character.Swing("talk", 20, 2, 1);
+  TemporaryFolder folder;
+  folder.Write("m.gltf", character.builder.Text());
+  Result<Rig> rig = LoadRig(AcceleratedRegistry(), folder.Write("m.yaml", R"(kpsa: 1
+character: m.gltf
+controls: {root.rotateZ: {min: -3deg, max: 3deg}}
+accelerate: {strip: {points: [strip@skin], subspace: m.kpsa, tolerance: 1mm, train: {clips: [talk], samples: 60}}}
+)"),
+                            {});
+  ASSERT_TRUE(rig.ok()) << rig.status().ToString();
+  Compiler compiler;
+  const TrainingRig training = MakeTrainingRig(&*rig, rig->accelerate.at(0));
+  const std::vector<TrainingClip> clips{{"talk", {0, 0.5, 1, 1.5}}};
+  const Result<TrainingSignals> signals = FindTrainingSignals(training, &compiler, clips, true);
+  ASSERT_TRUE(signals.ok()) << signals.status().ToString();
+  const Result<std::vector<std::string>> alone =
+      MovedByClipsAlone(training, &compiler, clips, signals->watched);
+  ASSERT_TRUE(alone.ok()) << alone.status().ToString();
+  EXPECT_EQ(*alone, std::vector<std::string>{"tip.matrix"});
 }
 
 }  // namespace

@@ -180,15 +180,17 @@ TEST(SoftCache, GuardsComeInSmoothly) {
   EXPECT_NEAR(range.hi, 1.02, 1e-5);
   const auto weight = [&](double value) { return GuardWeight(range.lo, range.hi, range.ramp, value); };
   for (const double inside : {-0.02, 0.0, 0.5, 1.02}) EXPECT_EQ(weight(inside), 0) << inside;
+  for (const double forgiven : {range.lo - 0.009, range.hi + 0.009}) EXPECT_EQ(weight(forgiven), 0);
+  for (const double beyond : {range.lo - 0.011, range.hi + 0.011}) EXPECT_GT(weight(beyond), 0);
   for (const double outside : {-0.13, 1.13, kInfinity, -kInfinity, std::nan("")})
     EXPECT_EQ(weight(outside), 1);
-  EXPECT_NEAR(weight(range.hi + 0.05), 0.5, 1e-9);
-  EXPECT_NEAR(weight(range.lo - 0.05), 0.5, 1e-9);
+  EXPECT_NEAR(weight(range.hi + 0.055), 0.5, 1e-9);
+  EXPECT_NEAR(weight(range.lo - 0.055), 0.5, 1e-9);
   double last = 0;
   for (int i = 0; i <= 1000; ++i) {
     const double w = weight(1 + 0.15 * i / 1000);
     EXPECT_GE(w, last);
-    EXPECT_LT(w - last, 1.6 * 0.15 / 1000 / 0.1);  // the slope of a smoothstep is at most 1.5
+    EXPECT_LT(w - last, 1.6 * 0.15 / 1000 / 0.09);  // the slope of a smoothstep is at most 1.5
     last = w;
   }
   EXPECT_EQ(GuardWeight(3, 3, 0, 3), 0);  // no ramp

@@ -33,5 +33,22 @@ TEST(TrainReport, SaysHowManyTolerancesTheWorstIsOff) {
       "that is 31 tolerances: look at it, and at the controls it moves, before this is used\n");
 }
 
+// Morph targets of a rig whose controls are others: left and right brow, always alike in the clips, parted in another one
+// and were wrong, all of them hits, and nothing had said that they are known in pairs alone.
+TEST(TrainReport, NamesWhatClipsAloneMove) {
+  TrainResult result;
+  result.subspace = std::make_shared<Subspace>();
+  result.rig = "face.yaml";
+  EXPECT_EQ(TrainText(result).find("moved by clips"), std::string::npos);
+  for (int i = 0; i < 8; ++i)
+    result.record.by_clips_alone.push_back("face.weight[" + std::to_string(i) + "]");
+  EXPECT_NE(TrainText(result).find(
+                "moved by clips and by no control, so known as these clips do it alone: face.weight[0], "
+                "face.weight[1], face.weight[2], face.weight[3], face.weight[4], face.weight[5] and 2 more; "
+                "another clip"),
+            std::string::npos)
+      << TrainText(result);
+}
+
 }  // namespace
 }  // namespace kpsa::engine

@@ -12,7 +12,9 @@ namespace {
 
 constexpr int kColumns = 9;  // x from -1 to 1; even vertices below, odd ones above
 
-std::string Strip(float shift = 0) {
+// stored: positions are as KHR_mesh_quantization has them, of other units and from another origin, and the skin says where
+// they are.
+std::string Strip(float shift = 0, bool stored = false) {
   GltfBuilder b;
   std::vector<float> positions, weights;
   std::vector<std::uint8_t> joints;
@@ -32,6 +34,12 @@ std::string Strip(float shift = 0) {
   std::vector<float> inverse_binds(48, 0.f);
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t k = 0; k < 4; ++k) inverse_binds[16 * i + 5 * k] = 1;
+  }
+  for (std::size_t i = 0; stored && i < positions.size(); ++i)
+    positions[i] = (positions[i] + (i % 3 == 0 ? 5.f : 0.f)) * 1024;
+  for (std::size_t i = 0; stored && i < 3; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) inverse_binds[16 * i + 5 * k] = 1 / 1024.f;
+    inverse_binds[16 * i + 12] = -5;
   }
   b.Push("meshes", {{"primitives",
                      {{{"attributes",
@@ -322,6 +330,24 @@ TEST(MirroredName, NeedsAJointThatExists) {
   EXPECT_EQ(other("l_thigh"), "r_thigh");
   EXPECT_EQ(other("upperarm01.L"), "upperarm01.L");
   EXPECT_EQ(other("head"), "head");
+}
+
+// The middle of positions that are whole numbers is not the character's: a mirror there gave the left side joints of the
+// right one.
+TEST_F(DeformerWeightsTest, AStoredMeshIsMirroredWhereTheSkinHasIt) {
+  const Rig plain = Loaded("");
+  const MirroredWeights expected = Mirrored(plain, "strip@skin", {});
+  folder.Write("c.gltf", Strip(0, true));
+  const Rig rig = Loaded("");
+  const MirroredWeights mirrored = Mirrored(rig, "strip@skin", {});
+  EXPECT_TRUE(mirrored.unmatched.empty());
+  EXPECT_NEAR(mirrored.tolerance, expected.tolerance, 1e-6) << "lengths are those of the world";
+  ASSERT_EQ(mirrored.file.maps.size(), expected.file.maps.size());
+  for (std::size_t m = 0; m < expected.file.maps.size(); ++m) {
+    EXPECT_EQ(mirrored.file.maps[m].name, expected.file.maps[m].name);
+    EXPECT_EQ(mirrored.file.maps[m].indices, expected.file.maps[m].indices);
+    EXPECT_EQ(mirrored.file.maps[m].values, expected.file.maps[m].values);
+  }
 }
 
 }  // namespace

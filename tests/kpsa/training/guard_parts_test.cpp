@@ -107,12 +107,14 @@ TEST(GuardPartsOfJudges, AreTheLargestThatSpeakOfAPatch) {
   const std::vector<std::vector<float>> entries = {{2, 1.5f, 1, 9}, {0.5f, 0, 3, 9}, {1, 1, 1, 9}};
   AskGuards(ranges, {1, 1, 1, 0}, entries, 4, &judges);
   EXPECT_EQ(judges[0].guard, 0);
-  EXPECT_EQ(judges[0].guards_of_patches, (std::vector<float>{0.5f, 0.5f, 0.5f, 0}));
+  const auto half_way = static_cast<float>(GuardWeight(0, 1, 2, 2));
+  EXPECT_GT(half_way, 0.4f);
+  EXPECT_EQ(judges[0].guards_of_patches, (std::vector<float>{half_way, half_way, half_way, 0}));
   EXPECT_EQ(judges[1].guard, 1);
   EXPECT_TRUE(judges[1].guards_of_patches.empty());
   EXPECT_EQ(judges[2].guard, 0);
   EXPECT_TRUE(judges[2].guards_of_patches.empty());
-  EXPECT_EQ(WithoutPatches(judges[0]).guard, 0.5);
+  EXPECT_FLOAT_EQ(static_cast<float>(WithoutPatches(judges[0]).guard), half_way);
 }
 
 }  // namespace
