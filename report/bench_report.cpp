@@ -132,7 +132,12 @@ bool MayLearn(const BenchResult& r) {
 }  // namespace
 
 ToleranceWords BenchWords(const BenchResult& r) {
-  return {"frames", "train on clips that are like these, or on more samples", r.light};
+  // More samples end where controls do
+  const bool beyond = r.most_frequent_reason.ends_with(" is outside its trained range");
+  return {"frames",
+          beyond ? "train on clips that are like these, or widen the controls that these go beyond"
+                 : "train on clips that are like these, or on more samples",
+          r.light};
 }
 
 std::string FramesText(const std::vector<BenchResult>& results) {

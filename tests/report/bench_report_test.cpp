@@ -34,6 +34,16 @@ TEST(BenchReport, TheSpeedupHasASpread) {
       << BenchText({result}, context);
 }
 
+TEST(BenchReport, AdvisesSamplesWhereTheseMayHelpAlone) {
+  BenchResult result;
+  result.most_frequent_reason = "most frequent reason (9 frames, first at frame 1): unlike the trained poses";
+  EXPECT_EQ(BenchWords(result).where_few, "train on clips that are like these, or on more samples");
+  result.most_frequent_reason =
+      "most frequent reason (9 frames, first at frame 1): tail_3.matrix is outside its trained range";
+  EXPECT_EQ(BenchWords(result).where_few,
+            "train on clips that are like these, or widen the controls that these go beyond");
+}
+
 TEST(BenchReport, SaysWhySlowerAndWhatToDoWhereFramesMiss) {
   BenchResult result;
   result.full_ms = 1, result.accelerated_ms = 1.2, result.frames = 10, result.promise.tolerance = 0.01;
