@@ -21,7 +21,7 @@ struct PointValues {
 
 struct Touching {  // a morph target that moves the point
   Index target = 0;
-  double size = 0;
+  Double3 delta;  // in the mesh's space
 };
 
 std::vector<Touching> TargetsOf(const CharacterMesh& mesh, Index point) {
@@ -32,7 +32,7 @@ std::vector<Touching> TargetsOf(const CharacterMesh& mesh, Index point) {
     const auto it = std::lower_bound(targets[k].points.begin(), targets[k].points.end(), point);
     if (it == targets[k].points.end() || *it != point) continue;
     const float* delta = &targets[k].deltas[3 * static_cast<std::size_t>(it - targets[k].points.begin())];
-    touching.push_back({k, Length({delta[0], delta[1], delta[2]})});
+    touching.push_back({k, {delta[0], delta[1], delta[2]}});
   }
   return touching;
 }
@@ -98,6 +98,21 @@ double WeightOf(const Rig& rig, const Stage& stage, Index point) {
   return map == nullptr || point >= map->weights().size() ? 1 : static_cast<double>(map->weights()[point]);
 }
 
+// What a shift in the mesh's space is in the world in the rest pose: a mesh may be stored in any units, and its skin says
+// what they are.
+Double3 ShiftInWorld(const CharacterMesh& mesh, Index point, const PointValues& rest, Double3 shift) {
+  Double3 shifted;
+  double total = 0;
+  for (std::size_t j = 0; j < rest.joints.size(); ++j) {
+    const Index at = mesh.influences->offsets()[point] + static_cast<Index>(j);
+    const auto weight = static_cast<double>(mesh.influences->weights()[at]);
+    const Matrix4& bind = mesh.inverse_binds[mesh.influences->joints()[at]];
+    shifted = shifted + weight * TransformVector(rest.joints[j], TransformVector(bind, shift));
+    total += weight;
+  }
+  return total > 0 ? shifted * (1 / total) : TransformVector(rest.node, shift);
+}
+
 }  // namespace
 
 Result<VertexStory> TellOfVertex(const Rig& rig, const Rig& rest, const VertexName& name, double time) {
@@ -117,8 +132,9 @@ Result<VertexStory> TellOfVertex(const Rig& rig, const Rig& rest, const VertexNa
   story.points = mesh.mesh().point_count();
   story.time = time;
   for (std::size_t k = 0; k < touching.size(); ++k) {
+    const double size = Length(ShiftInWorld(mesh, point, *before, touching[k].delta));
     story.morphs.push_back(
-        {mesh.geometry.targets->targets()[touching[k].target].name, touching[k].size, now->weights[k]});
+        {mesh.geometry.targets->targets()[touching[k].target].name, size, now->weights[k]});
   }
   std::stable_sort(story.morphs.begin(), story.morphs.end(),
                    [](const VertexStory::Morph& a, const VertexStory::Morph& b) {
@@ -154,7 +170,7 @@ Result<VertexStory> TellOfVertex(const Rig& rig, const Rig& rest, const VertexNa
     VertexStory::Stage told{stage.name, rig.graph->def(stage.node).name, stage.world,
                             WeightOf(rig, stage, point)};
     if (AttributeOf(rig, stage.node, "envelope") >= 0) told.envelope = now->envelopes[s];
-    told.moved = Length(at - from);
+    told.moved = Length(world ? at - from : ShiftInWorld(mesh, point, *before, at - from));
     story.stages.push_back(std::move(told));
   }
   std::stable_sort(

@@ -109,6 +109,37 @@ TEST_F(Explain, AVertexIsMovedByWhatItIsSaidToBe) {
   EXPECT_EQ(Row(set["stages"], "stage", "mush")["moved_m"], 0);
 }
 
+// A mesh that is stored in thousandths, as quantized ones are: what a morph target moves is told as it comes out.
+TEST_F(Explain, LengthsOfAMorphAreThoseOfTheWorld) {
+  GltfBuilder b;
+  std::vector<float> bind(16, 0.0f);
+  for (const std::size_t k : {0u, 5u, 10u}) bind[k] = 0.001f;
+  bind[15] = 1;
+  const std::vector<float> positions = {0, 0, 0, 1000, 0, 0, 0, 1000, 0},
+                           deltas = {0, 500, 0, 0, 0, 0, 0, 0, 0},
+                           weights = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  b.Push("meshes", {{"name", "sheet"},
+                    {"weights", {0.5}},
+                    {"extras", {{"targetNames", {"lift"}}}},
+                    {"primitives",
+                     {{{"attributes",
+                        {{"POSITION", b.Accessor(positions, "VEC3")},
+                         {"JOINTS_0", b.Accessor(std::vector<std::uint8_t>(12, 0), "VEC4")},
+                         {"WEIGHTS_0", b.Accessor(weights, "VEC4")}}},
+                       {"targets", {{{"POSITION", b.Accessor(deltas, "VEC3")}}}},
+                       {"indices", b.Accessor(std::vector<std::uint16_t>{0, 1, 2}, "SCALAR")}}}}});
+  b.Push("skins", {{"joints", {1}}, {"inverseBindMatrices", b.Accessor(bind, "MAT4")}});
+  b.Push("nodes", {{"name", "sheet"}, {"mesh", 0}, {"skin", 0}});
+  b.Push("nodes", {{"name", "root"}});
+  b.Push("scenes", {{"nodes", {0, 1}}});
+  b.root["scene"] = 0;
+  const TemporaryFolder folder;
+  const nlohmann::json story = Tell({folder.Write("m.gltf", b.Text()), "sheet[0]", "--rest"});
+  ASSERT_EQ(story["morphs"].size(), 1u);
+  EXPECT_NEAR(story["morphs"][0]["size_m"].get<double>(), 0.5, 1e-6);
+  EXPECT_NEAR(Row(story["stages"], "stage", "morph")["moved_m"].get<double>(), 0.25, 1e-6);
+}
+
 TEST_F(Explain, MorphsAndWeightMapsOfAVertex) {
   const nlohmann::json weights =
       nlohmann::json::parse(TemporaryFolder::Read(KPSA_SCENES_DIR "/face/w/face.json"))["maps"]["upperLip"];
