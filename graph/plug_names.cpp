@@ -56,9 +56,12 @@ Result<PlugRef> Graph::FindPlug(std::string_view text) const {
   const std::size_t dot = text.find('.');
   if (dot == std::string_view::npos)
     return Status::Invalid("\"{}\" is no plug: expected node.attribute", text);
-  const std::string_view guess = text.substr(0, text.find_first_of("[", 0) == std::string_view::npos
-                                                    ? text.rfind('.')
-                                                    : text.substr(0, text.find('[')).rfind('.'));
+  std::string_view path = text.substr(0, text.find('['));
+  // A component, of rotate.x
+  const auto dots = std::ranges::count(path, '.');
+  if (dots > 1 && path[path.size() - 2] == '.' && path.back() >= 'x' && path.back() <= 'z')
+    path.remove_suffix(2);
+  const std::string_view guess = path.substr(0, path.rfind('.'));
   return Status::Invalid("unknown node \"{}\" in plug \"{}\"{}", guess, text, DidYouMean(guess, Names()));
 }
 

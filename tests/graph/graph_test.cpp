@@ -247,6 +247,7 @@ TEST_F(GraphTest, PlugsByName) {
             "node \"Cage 1\" (grid) has no attribute \"sice\" (did you mean \"size\"?)");
   EXPECT_EQ(NameOf("Cgae 1.size"),
             "unknown node \"Cgae 1\" in plug \"Cgae 1.size\" (did you mean \"Cage 1\"?)");
+  EXPECT_EQ(Why(g.graph.FindPlug("elbow.rotate.x")), "unknown node \"elbow\" in plug \"elbow.rotate.x\"");
   EXPECT_EQ(NameOf("size"), "\"size\" is no plug: expected node.attribute");
   for (const char* odd : {"", ".", "..", "[", "]", ".[", "Cage 1.", ".size", "Cage 1.[0]", "Cage 1.weight[]",
                           "Cage 1.points[,,]", "Cage 1.center.x.y"}) {
