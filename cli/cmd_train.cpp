@@ -56,8 +56,9 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
     const Result<double> value = ParseLength("--tolerance", *flags.tolerance);
     if (!value.ok()) return value.status();
     if (!(*value > 0))
-      return Status::Usage("--tolerance {}: nothing is ever accepted at 0; a length above 0, as in 1mm",
-                           *flags.tolerance);
+      return Status::Usage(
+          "--tolerance \"{}\": expected a length above 0, as in 1mm; at 0 nothing is ever accepted",
+          *flags.tolerance);
     options->tolerance = *value;
   }
   if (flags.time.has_value()) {

@@ -134,8 +134,8 @@ void Contender::NoteClip(const std::string& clip, bool still) {
     for (const AppliedSubspace& one : applied) {
       const TrainingRecord record = ParseTraining(one.subspace->training);
       const std::string inner = MakeTarget(open->rig, one.entry).within.Inner(part);
-      const auto learnt =
-          std::ranges::find(record.learnt, inner, [](const auto& clip) { return std::string(clip.first); });
+      const auto learnt = std::ranges::find(
+          record.learnt, inner, [](const auto& clip) -> const std::string& { return clip.first; });
       if (std::ranges::find(record.clips, inner) != record.clips.end()) {
         result.notes.push_back(
             fmt::format("{} was trained on: its errors say nothing about new frames", part));

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <set>
+
+#include "kpsa/training/calibrate_subspace.h"
+#include "kpsa/training/training_poses.h"
 
 namespace kpsa::engine {
 namespace {
@@ -32,6 +36,28 @@ TEST(KeepSpread, LeavesPosesOfClipsAndSamplesInTheirShares) {
   EXPECT_EQ(std::count_if(kept.begin(), kept.end(), [](float t) { return t < 40; }),
             static_cast<std::ptrdiff_t>(of_clips));
   EXPECT_NEAR(static_cast<double>(of_clips), 4, 1);
+}
+
+// What has to come at the end is nobody else's: a quarter of the rest is what samples may take.
+TEST(TimeLimits, SetAsideWhatCalibrationTakesAtLeast) {
+  TrainOptions options;
+  options.violation_rate = 0.05, options.calibration_poses = 0;
+  const double fewest = LeastCalibrationSeconds(0.01, options);
+  EXPECT_GT(fewest, 0.01 * 2 * 45) << "of each kind as many as promise one in twenty, twice";
+  options.violation_rate = 0.01;
+  EXPECT_GT(LeastCalibrationSeconds(0.01, options), 2 * fewest);
+  options.calibration_poses = 1000;
+  EXPECT_GT(LeastCalibrationSeconds(0.01, options), 0.01 * 2 * 1000);
+  TrainingPoses poses(Numbered(1).layout());
+  poses.pose_seconds = 0.01;
+  TimeLimit limit(1000);
+  EXPECT_EQ(poses.SampledWithin(limit, 100), 100u);
+  EXPECT_NEAR(static_cast<double>(poses.SampledWithin(limit, 1'000'000)), 25'000, 2500);
+  limit.Reserve(800);
+  EXPECT_NEAR(static_cast<double>(poses.SampledWithin(limit, 1'000'000)), 5000, 2500);
+  limit.Reserve(2000);
+  EXPECT_EQ(poses.SampledWithin(limit, 100), 0u);
+  EXPECT_EQ(poses.SampledWithin(TimeLimit(std::numeric_limits<double>::infinity()), 100), 100u);
 }
 
 TEST(SpareForModes, TakesAQuarterWhereThereIsTooMuchWork) {
