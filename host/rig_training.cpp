@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "host/clip_controls.h"
 #include "host/rig_frames.h"
 
 namespace kpsa::engine {
@@ -23,11 +24,11 @@ namespace {
 
 // Where the value of a control can be read that would give what a clip does: a clip drives morph weights
 // themselves, and moves joints underneath their rotate and translate.
-std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
-  if (control.by_clip) return control.plug;
-  const NodeDef& def = graph.def(control.plug.node);
-  const std::string& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)].name;
-  PlugRef shown = control.plug;
+std::optional<PlugRef> ShownByClip(const Graph& graph, const PlugRef& plug, bool by_clip) {
+  if (by_clip) return plug;
+  const NodeDef& def = graph.def(plug.node);
+  const std::string& attribute = def.attributes[static_cast<std::size_t>(plug.attribute)].name;
+  PlugRef shown = plug;
   shown.attribute = def.FindAttribute(attribute == "rotate"      ? "poseRotate"
                                       : attribute == "translate" ? "poseTranslate"
                                       : attribute == "scale"     ? "poseScale"
@@ -125,7 +126,7 @@ TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry) {
     if (def.attributes[static_cast<std::size_t>(control.plug.attribute)].diagnostic) continue;
     training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
                                  carriers.count(control.plug.node.index) != 0,
-                                 ShownByClip(*rig->graph, control)});
+                                 ShownByClip(*rig->graph, control.plug, control.by_clip)});
     training.controls.back().turns = OrderOf(*rig->graph, control.plug);
     // The attribute's own limits; what counts or chooses has no values in between
     const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)];
@@ -133,6 +134,12 @@ TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry) {
     const bool whole = type == Type::kInt || type == Type::kBool || type == Type::kEnum;
     training.controls.back().lowest = whole ? control.min : attribute.min;
     training.controls.back().highest = whole ? control.max : attribute.max;
+  }
+  training.by_clips = ControlsOfClips(*rig, entry);
+  for (ControlRange& control : training.by_clips) {
+    control.often = carriers.contains(control.plug.node.index);
+    control.shown = ShownByClip(*rig->graph, control.plug, control.by_clip);
+    control.turns = OrderOf(*rig->graph, control.plug);
   }
   training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
   return training;

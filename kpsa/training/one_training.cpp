@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"
+#include "kpsa/training/joint_corners.h"
 #include "kpsa/training/mend_tiles.h"
 #include "kpsa/training/training_signals.h"
 #include "kpsa/training/untold_controls.h"
@@ -50,7 +51,20 @@ Status FindRanges(TrainingSetup* setup, const TrainingPoses& poses, RangeFinder*
   ranges->Widen(poses.poses);
   if (poses.spare) ranges->Widen(*poses.spare);
   for (const PoseMatrix& learnt : poses.learnt) ranges->Plays(learnt);
-  return setup->of_light() ? Status() : ranges->Widen(setup->clips, setup->recorder.get());
+  if (setup->of_light()) return Status();
+  KPSA_RETURN_IF_ERROR(
+      WidenByCorners(setup->rig, setup->guards, setup->layout, setup->recorder.get(), ranges));
+  return ranges->Widen(setup->clips, setup->recorder.get());
+}
+
+// What is keyed to stay where it is moves with no clip.
+std::vector<Signal> GuardsThatMove(const TrainingSetup& setup, const RangeFinder& ranges) {
+  const std::vector<Index> first = FirstScalars(setup.recorder->signals(), setup.layout);
+  std::vector<Signal> moved;
+  for (std::size_t g = 0; g < setup.guards.size(); ++g) {
+    if (ranges.Moves(first[g], setup.guards[g].entries())) moved.push_back(setup.guards[g]);
+  }
+  return moved;
 }
 
 // Which rig it was trained on.
@@ -154,12 +168,6 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
   KPSA_RETURN_IF_ERROR(setup.Prepare());
-  if (!rig.controls.empty() && !setup.of_light()) {
-    Result<std::vector<std::string>> alone =
-        MovedByClipsAlone(setup.rig, &setup.compiler, clips, setup.guards);
-    if (!alone.ok()) return alone.status();
-    record.by_clips_alone = std::move(*alone);
-  }
 
   // Poses
   TrainingPoses poses(setup.layout);
@@ -172,6 +180,12 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   if (setup.layout.products > 0) ChooseProducts(&setup, &poses);
   RangeFinder ranges(setup.layout);
   KPSA_RETURN_IF_ERROR(FindRanges(&setup, poses, &ranges));
+  if (!rig.controls.empty() && !setup.of_light()) {
+    Result<std::vector<std::string>> alone =
+        MovedByClipsAlone(setup.rig, &setup.compiler, clips, GuardsThatMove(setup, ranges));
+    if (!alone.ok()) return alone.status();
+    record.by_clips_alone = std::move(*alone);
+  }
   if (setup.of_light() && setup.of_map()) poses.judges = poses.poses.TakeEvery(kJudgeOfLight);
 
   TrainingModes modes;

@@ -104,12 +104,6 @@ class Sampler {
     }
   }
 
-  // Every control at an end.
-  void MoveToEnds(SampledPose* pose) {
-    for (std::size_t i = 0; i < controls_.size(); ++i)
-      pose->values[i] = random_.Unit() < 0.5 ? controls_[i].min : controls_[i].max;
-  }
-
   // From eight up to all of them; the ends are where most of them add up.
   void MoveManyAnywhere(bool to_ends, SampledPose* pose) {
     const std::size_t n = controls_.size(), least = std::min(n, kLeastOfMany);
@@ -280,10 +274,6 @@ std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls,
                                      std::uint64_t seed) {
   return FromRest(controls, count, seed,
                   [&](Sampler* of, bool odd, SampledPose* pose) { of->Fold(branches, odd, pose); });
-}
-std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
-                                     std::uint64_t seed) {
-  return FromRest(controls, count, seed, [](Sampler* of, bool, SampledPose* pose) { of->MoveToEnds(pose); });
 }
 std::vector<SampledPose> PosesWithMany(const std::vector<ControlRange>& controls, std::size_t count,
                                        std::uint64_t seed) {

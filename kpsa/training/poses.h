@@ -79,11 +79,6 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
 std::vector<SampledPose> PosesFolded(const std::vector<ControlRange>& controls,
                                      std::span<const Branch> branches, std::size_t count, std::uint64_t seed);
 
-// `count` poses with every control at its least or its most: among them is about each corner of what three
-// controls of a transform reach, where the entries of its matrix end.
-std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
-                                     std::uint64_t seed);
-
 // `count` poses with many controls away from rest, from eight up to all of them: anywhere in their ranges, and in every
 // second pose at their ends.
 std::vector<SampledPose> PosesWithMany(const std::vector<ControlRange>& controls, std::size_t count,

@@ -321,9 +321,6 @@ Status SubspaceCandidates::AddPosesForTiles() {
   record->sampled_poses += more.poses();
   ranges_of_tiles = RangeFinder(setup->layout);
   ranges_of_tiles.Widen(more);
-  PoseMatrix ends(setup->layout);
-  KPSA_RETURN_IF_ERROR(sampler.AddEnds(&ends));
-  ranges_of_tiles.Widen(ends);
   if (more.poses() > 0) more.Subtract(modes->pca.mean);
   poses->poses.Append(std::move(more));
   if (poses->spare) {

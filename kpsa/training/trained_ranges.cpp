@@ -14,6 +14,7 @@ namespace {
 // `kHardlyMoved` in training has its guard fully there after `kStillRamp`, others after `kLeastRamp` at
 // least.
 constexpr double kSlackShare = 0.05, kHardlyMoved = 2, kStillRamp = 1, kLeastRamp = 0.25;
+constexpr double kNoise = 1e-5;      // of an entry, and of 1
 constexpr double kStillTurn = 5e-4;  // of light: a turn (radians) of a joint that is none
 constexpr std::array<double, 4> kParts = {0.0, 0.25, 0.5, 0.75};  // of a frame: clips are looked at there
 constexpr std::size_t kMostPlayed = 4096;
@@ -30,10 +31,7 @@ void RangeFinder::Widen(std::span<const float> scalars) {
     lo_.assign(scalars.begin(), scalars.end());
     hi_ = lo_;
   }
-  for (std::size_t e = 0; e < scalars.size(); ++e) {
-    lo_[e] = std::min<double>(lo_[e], scalars[e]);
-    hi_[e] = std::max<double>(hi_[e], scalars[e]);
-  }
+  Widen(0, scalars);
 }
 
 void RangeFinder::Widen(const RangeFinder& others) {
@@ -41,6 +39,14 @@ void RangeFinder::Widen(const RangeFinder& others) {
   for (const std::vector<double>* end : {&others.lo_, &others.hi_}) {
     const std::vector<float> scalars(end->begin(), end->end());
     Widen(scalars);
+  }
+}
+
+void RangeFinder::Widen(Index first, std::span<const float> scalars) {
+  for (std::size_t e = 0; e < scalars.size(); ++e) {
+    const std::size_t i = static_cast<std::size_t>(first) + e;
+    lo_[i] = std::min<double>(lo_[i], scalars[e]);
+    hi_[i] = std::max<double>(hi_[i], scalars[e]);
   }
 }
 
@@ -70,6 +76,14 @@ Status RangeFinder::Widen(const std::vector<TrainingClip>& clips, PoseRecorder* 
     }));
   }
   return Status();
+}
+
+bool RangeFinder::Moves(Index first, std::size_t count) const {
+  const std::size_t begin = static_cast<std::size_t>(first);
+  for (std::size_t e = begin; e < begin + count; ++e) {
+    if (hi_[e] - lo_[e] > kNoise * std::max({1.0, std::fabs(lo_[e]), std::fabs(hi_[e])})) return true;
+  }
+  return false;
 }
 
 Result<std::vector<TrainedRange>> RangeFinder::Make(const TrainingRig& rig, Compiler* compiler,

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "kpsa/partial_step.h"
+#include "kpsa/training/clip_controls.h"
 #include "kpsa/training/frame_cost.h"
 #include "kpsa/training/one_training.h"
 #include "kpsa/training/some_points.h"
@@ -352,11 +353,13 @@ Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& 
   if (options.progress)
     watched.progress = [&](const char* what, double share) { return cancel.Say(what, share); };
   try {
-    Result<Subspace> trained = Finish(TrainFollowing(rig, clips, watched));
+    const Result<TrainingRig> all = WithClipControls(rig, clips);
+    if (!all.ok()) return all.status();
+    Result<Subspace> trained = Finish(TrainFollowing(*all, clips, watched));
     if (!trained.ok() && cancel.asked()) throw Cancelled();  // an evaluation that was ended, say
     if (!trained.ok() || !watched.by_tile_as_before || trained->by_tile()) return trained;
     watched.by_tile_as_before = false;  // with cues for all points, what is learnt changes all of them
-    return Finish(TrainFollowing(rig, clips, watched));
+    return Finish(TrainFollowing(*all, clips, watched));
   } catch (const Cancelled&) {
     KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
     return Status::Make(ErrorKind::kInterrupted, "interrupted");

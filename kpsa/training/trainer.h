@@ -82,6 +82,9 @@ struct TrainingRig {
   AccelerationTarget target;
   std::vector<ControlRange> controls;
   std::function<Status(std::optional<std::string_view>)> set_clip;
+  // What the training clips move and no control does, in the ranges that they have there: it is posed like the controls
+  // where the points depend on it (kpsa/training/clip_controls.h).
+  std::vector<ControlRange> by_clips = {};
   // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
   std::vector<Compiler::SplitPoints> split = {};
   // By mesh, the points of which alone that is (kpsa/partial_step.h); empty: all. Train's own.

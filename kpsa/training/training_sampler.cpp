@@ -13,7 +13,6 @@ constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, and
 constexpr std::size_t kMostJudgeBytes = 400'000'000;   // of those that judge: huge meshes have fewer, but
 constexpr std::size_t kLeastSamples = 200;
 constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
-constexpr std::size_t kAtEnds = 40;   // poses: each of eight corners is missed by one transform in 200
 constexpr double kTogether = 0.3;     // of the samples, besides: poses that move most controls at once
 constexpr double kFolded = 0.2;       // likewise, in which what bends one way is bent
 constexpr std::pair<PoseKind, double> kOtherKinds[] = {{PoseKind::kBeyond, 0.08},
@@ -108,12 +107,6 @@ std::vector<SampledPose> TrainingSampler::Folded(std::size_t count, std::uint64_
 Status TrainingSampler::AddFolded(std::size_t beside, double share, PoseMatrix* poses) const {
   const std::size_t count = std::min(SamplesOf(kFolded * share), RoomBeside(beside));
   return recorder_->AddSamples(Folded(count, options_.seed ^ 0x510e527fade682d1ull), clips_, poses);
-}
-
-Status TrainingSampler::AddEnds(PoseMatrix* poses) const {
-  std::vector<SampledPose> at_ends = PosesAtEnds(drawn_, kAtEnds, options_.seed);
-  AddTilts(rig_.controls, drawn_.size(), options_.seed, &at_ends);
-  return recorder_->AddSamples(at_ends, clips_, poses);
 }
 
 std::size_t TrainingSampler::RoomBeside(std::size_t poses) const {

@@ -46,8 +46,6 @@ class TrainingSampler {
   Status AddFolded(std::size_t beside, double share, PoseMatrix* poses) const;
   // PosesFolded, not recorded.
   std::vector<SampledPose> Folded(std::size_t count, std::uint64_t seed) const;
-  // Of which only the values of transforms are of use, not the points.
-  Status AddEnds(PoseMatrix* poses) const;
   // New poses that judge; kinds: the PoseKind of each.
   Status AddJudges(PoseMatrix* judges, std::vector<int>* kinds) const;
 

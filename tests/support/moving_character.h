@@ -42,12 +42,14 @@ struct MovingCharacter {
     builder.Push("scenes", {{"nodes", {0, 1}}});
     builder.root["scene"] = 0;
   }
-  // A channel of a node in a clip of that name, which is added where it is new. `path` is translation or
-  // rotation.
+  // A channel of a node in a clip of that name, which is added where it is new. `path` is as
+  // glTF has them.
   void Animate(const std::string& clip, int node, const char* path, const std::vector<float>& times,
                const std::vector<float>& values, const char* interpolation = "LINEAR") {
     const int input = builder.Accessor(times, "SCALAR");
-    const int output = builder.Accessor(values, path == std::string("rotation") ? "VEC4" : "VEC3");
+    const int output = builder.Accessor(values, path == std::string("rotation")  ? "VEC4"
+                                                : path == std::string("weights") ? "SCALAR"
+                                                                                 : "VEC3");
     nlohmann::json* found = nullptr;
     for (nlohmann::json& known : builder.root["animations"]) {
       if (known["name"] == clip) found = &known;

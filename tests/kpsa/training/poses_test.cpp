@@ -145,23 +145,6 @@ TEST(PosesFolded, LeaveMostOfManyAsTheyAre) {
   EXPECT_GT(head, 100u) << "the one they hang from turns as ever";
 }
 
-TEST(PosesAtEnds, HaveEveryCornerOfEachTransform) {
-  const std::vector<ControlRange> controls = Controls();
-  std::set<int> corners[2];
-  for (const SampledPose& pose : PosesAtEnds(controls, 60, 7)) {
-    for (std::size_t c = 0; c < controls.size(); ++c)
-      EXPECT_TRUE(pose.values[c] == controls[c].min || pose.values[c] == controls[c].max);
-    for (std::size_t n = 0; n < 2; ++n) {
-      int corner = 0;
-      for (std::size_t axis = 0; axis < 3; ++axis) corner = 2 * corner + (pose.values[3 * n + axis] > 0);
-      corners[n].insert(corner);
-    }
-  }
-  EXPECT_EQ(corners[0].size(), 8u);
-  EXPECT_EQ(corners[1].size(), 8u);
-  EXPECT_TRUE(PosesAtEnds({}, 60, 7).empty());
-}
-
 // The second transform and the second weight stand still in the clips.
 ClipPoses FramesOfSome(const std::vector<ControlRange>& controls) {
   ClipPoses frames;
