@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"
-#include "kpsa/training/joint_corners.h"
 #include "kpsa/training/mend_tiles.h"
 #include "kpsa/training/training_signals.h"
+#include "kpsa/training/transform_ranges.h"
 #include "kpsa/training/untold_controls.h"
 #include "kpsa/training/whole_subspace.h"
 
@@ -53,7 +53,7 @@ Status FindRanges(TrainingSetup* setup, const TrainingPoses& poses, RangeFinder*
   for (const PoseMatrix& learnt : poses.learnt) ranges->Plays(learnt);
   if (setup->of_light()) return Status();
   KPSA_RETURN_IF_ERROR(
-      WidenByCorners(setup->rig, setup->guards, setup->layout, setup->recorder.get(), ranges));
+      WidenByTransforms(setup->rig, setup->guards, setup->layout, setup->recorder.get(), ranges));
   return ranges->Widen(setup->clips, setup->recorder.get());
 }
 

@@ -232,6 +232,19 @@ Status PoseRecorder::CheckFinite(std::span<const float> row) const {
   return Status::Evaluation("a point of an earlier stage is not a number");
 }
 
+namespace {
+
+void SetControl(const PlugRef& plug, Index varying, double value, Evaluator* evaluator) {
+  const Type type = evaluator->plan().varying()[varying].type;
+  if (type == Type::kInt || type == Type::kBool || type == Type::kEnum) {
+    evaluator->SetInt(varying, static_cast<std::int64_t>(value));
+  } else {
+    evaluator->Set(varying, value, plug.component);
+  }
+}
+
+}  // namespace
+
 Status PoseRecorder::Record(std::span<const RecordedPose* const> poses,
                             const std::function<std::span<float>(std::size_t)>& row,
                             const std::function<std::string(std::size_t)>& name) {
@@ -250,13 +263,7 @@ Status PoseRecorder::Record(std::span<const RecordedPose* const> poses,
   const auto set = [&](const RecordedPose& pose, Evaluator& e) {
     if (clip != nullptr) e.Set(time, pose.time);
     for (std::size_t k = 0; k < used.size(); ++k) {
-      const double value = pose.values[used[k]];
-      const Type type = plan->varying()[numbers[k]].type;
-      if (type == Type::kInt || type == Type::kBool || type == Type::kEnum) {
-        e.SetInt(numbers[k], static_cast<std::int64_t>(value));
-      } else {
-        e.Set(numbers[k], value, rig_.controls[used[k]].plug.component);
-      }
+      SetControl(rig_.controls[used[k]].plug, numbers[k], pose.values[used[k]], &e);
     }
   };
   std::vector<std::span<float>> rows;
@@ -331,14 +338,37 @@ Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
              [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
 }
 
-Status PoseRecorder::VisitSignals(const TrainingClip& clip,
-                                  const std::function<void(std::span<const float>)>& visit) {
-  KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
+Result<std::shared_ptr<const Plan>> PoseRecorder::PlanOfSignals(std::vector<PlugRef> varying) {
   Request request;
   for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
   for (const PlugRef& plug : rig_.target.space) request.outputs.push_back({plug, {}});
-  request.varying = {rig_.time};
-  Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+  request.varying = std::move(varying);
+  return compiler_->Compile(*rig_.graph, request);
+}
+
+Status PoseRecorder::VisitSignals(const std::vector<SampledPose>& poses,
+                                  const std::function<void(std::span<const float>)>& visit) {
+  KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+  const auto plan = PlanOfSignals(rig_.Varying(false));
+  if (!plan.ok()) return plan.status();
+  Evaluator evaluator(*plan);
+  std::vector<float> entries(layout_.scalars);
+  for (const SampledPose& pose : poses) {
+    for (const std::size_t c : rig_.FreeControls(false)) {
+      const PlugRef& plug = rig_.controls[c].plug;
+      SetControl(plug, (*plan)->FindVarying(plug), pose.values[c], &evaluator);
+    }
+    KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
+    StoreSignals(evaluator, SpaceFromWorld(evaluator), 0, entries);
+    visit(entries);
+  }
+  return Status();
+}
+
+Status PoseRecorder::VisitSignals(const TrainingClip& clip,
+                                  const std::function<void(std::span<const float>)>& visit) {
+  KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
+  const auto plan = PlanOfSignals({rig_.time});
   if (!plan.ok()) return plan.status();
   const Index time = (*plan)->FindVarying(rig_.time);
   Evaluator evaluator(*plan);

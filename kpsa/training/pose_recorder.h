@@ -69,6 +69,9 @@ class PoseRecorder {
                 const std::function<std::span<float>(std::size_t)>& row);
   // All entries of the signals, in their order, at each time of a clip; no points are evaluated.
   Status VisitSignals(const TrainingClip& clip, const std::function<void(std::span<const float>)>& visit);
+  // Likewise, in each of these poses, which play no clip.
+  Status VisitSignals(const std::vector<SampledPose>& poses,
+                      const std::function<void(std::span<const float>)>& visit);
   // The controls that would give the poses of the clips (ControlRange::shown), at rest where nothing shows
   // them.
   Result<ClipPoses> ControlsOfClips(const std::vector<TrainingClip>& clips);
@@ -81,6 +84,7 @@ class PoseRecorder {
   PlanResult CompileFor(const std::vector<PlugRef>& varying);
   // The plan of a clip, or with none: sampled, with the controls that the clip leaves free, else with time.
   PlanResult PlanOf(const std::string* clip, bool sampled);
+  Result<std::shared_ptr<const Plan>> PlanOfSignals(std::vector<PlugRef> varying);
   std::string NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const;
   // Of the space, which is the last output of the plan.
   Matrix4 SpaceFromWorld(const Evaluator& evaluator) const;

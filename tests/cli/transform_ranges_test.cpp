@@ -1,5 +1,5 @@
-// Ranges of a transform's matrix hold wherever all of its controls are within theirs (kpsa/training/joint_corners.h).
-#include "kpsa/training/joint_corners.h"
+// Ranges of a transform's matrix hold wherever all of its controls are within theirs (kpsa/training/transform_ranges.h).
+#include "kpsa/training/transform_ranges.h"
 
 #include "host/rig_training.h"
 #include "kpsa/training/training_setup.h"
@@ -10,7 +10,7 @@
 namespace kpsa::engine {
 namespace {
 
-TEST(JointCorners, AreWithinTheRanges) {
+TEST(TransformRanges, HoldAtAllCorners) {
   MovingCharacter character;
   TemporaryFolder folder;
   folder.Write("m.gltf", character.builder.Text());
@@ -58,7 +58,7 @@ accelerate: {strip: {points: [strip@skin], subspace: m.kpsa, tolerance: 1mm, tra
     finder.Widen(at_rest);
     if (corners) {
       const Status widened =
-          WidenByCorners(setup.rig, setup.guards, setup.layout, setup.recorder.get(), &finder);
+          WidenByTransforms(setup.rig, setup.guards, setup.layout, setup.recorder.get(), &finder);
       EXPECT_TRUE(widened.ok()) << widened.ToString();
     }
     return finder;
@@ -79,7 +79,6 @@ accelerate: {strip: {points: [strip@skin], subspace: m.kpsa, tolerance: 1mm, tra
     if (!range.plug.starts_with("tip.matrix")) continue;
     ++of_tip;
     moved += range.hi > (*few)[i].hi || range.lo < (*few)[i].lo;
-    // Of angles beyond a right one, or with a bend of the product in between, an entry may end inside a face
     const double extent = (*all)[i].hi - (*all)[i].lo;
     EXPECT_LE(range.lo, (*all)[i].lo + 0.02 * extent) << range.plug;
     EXPECT_GE(range.hi, (*all)[i].hi - 0.02 * extent) << range.plug;
