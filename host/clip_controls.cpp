@@ -8,21 +8,11 @@
 namespace kpsa::engine {
 namespace {
 
-// By glTF node, of the clips of these names and of those that they are layers of.
-std::vector<Motion> MotionOf(const Rig& rig, const std::vector<std::string>& names) {
-  std::vector<bool> plays(rig.character->clips.size(), false);
-  for (const std::string& name : names) {
-    for (std::size_t c = 0; c < plays.size(); ++c) plays[c] = plays[c] || rig.scene.clips[c].id == name;
-    for (const LayeredClip& layered : rig.scene.layered) {
-      if (layered.id != name) continue;
-      for (const LayeredClip::Layer& layer : layered.layers) plays[layer.clip] = true;
-    }
-  }
-  std::vector<Motion> motions(rig.character->nodes.size());
-  for (std::size_t c = 0; c < plays.size(); ++c) {
-    if (!plays[c]) continue;
-    for (const auto& [node, motion] : MeasureClip(*rig.character, rig.character->clips[c]))
-      motions[node].Add(motion);
+// By glTF node, of all clips.
+std::vector<Motion> MotionOf(const gltf::Character& character) {
+  std::vector<Motion> motions(character.nodes.size());
+  for (const gltf::Clip& clip : character.clips) {
+    for (const auto& [node, motion] : MeasureClip(character, clip)) motions[node].Add(motion);
   }
   return motions;
 }
@@ -98,8 +88,8 @@ class ClipControls {
 
 }  // namespace
 
-std::vector<ControlRange> ControlsOfClips(const Rig& rig, const AccelerateEntry& entry) {
-  const std::vector<Motion> motions = MotionOf(rig, entry.train_clips);
+std::vector<ControlRange> ControlsOfClips(const Rig& rig) {
+  const std::vector<Motion> motions = MotionOf(*rig.character);
   ClipControls controls(rig);
   for (std::size_t n = 0; n < motions.size(); ++n) controls.AddTransform(rig.scene.transforms[n], motions[n]);
   for (const CharacterMesh& mesh : rig.scene.meshes) {

@@ -1,4 +1,4 @@
-// What the clips of an `accelerate:` entry move that the rig has no control for.
+// What the clips of a character move that its rig has no control for.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace kpsa::engine {
 
-// The morph weights and the rotations, translations and scales of transforms that the entry's training clips move and
-// nothing else drives, each with the range that it has there (kpsa init would name these as controls).
-std::vector<ControlRange> ControlsOfClips(const Rig& rig, const AccelerateEntry& entry);
+// The morph weights and the rotations, translations and scales of transforms that the character's clips move and nothing
+// else drives, each with the range that it has in all of them (kpsa init would name these as controls).
+std::vector<ControlRange> ControlsOfClips(const Rig& rig);
 
 }  // namespace kpsa::engine

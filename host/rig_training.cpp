@@ -135,7 +135,7 @@ TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry) {
     training.controls.back().lowest = whole ? control.min : attribute.min;
     training.controls.back().highest = whole ? control.max : attribute.max;
   }
-  training.by_clips = ControlsOfClips(*rig, entry);
+  training.by_clips = ControlsOfClips(*rig);
   for (ControlRange& control : training.by_clips) {
     control.often = carriers.contains(control.plug.node.index);
     control.shown = ShownByClip(*rig->graph, control.plug, control.by_clip);

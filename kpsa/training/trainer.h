@@ -82,7 +82,7 @@ struct TrainingRig {
   AccelerationTarget target;
   std::vector<ControlRange> controls;
   std::function<Status(std::optional<std::string_view>)> set_clip;
-  // What the training clips move and no control does, in the ranges that they have there: it is posed like the controls
+  // What clips move and no control does, in the ranges that they have there: it is posed like the controls
   // where the points depend on it (kpsa/training/clip_controls.h).
   std::vector<ControlRange> by_clips = {};
   // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
