@@ -128,8 +128,9 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
         cue = CueName(*data.subspace, d);
         if (d.kind == CueDescription::Kind::kPoint) cue += fmt::format(" point {}", d.point);
       }
-      return reason == MissReason::kScore ? fmt::format("unlike the trained poses (most at {})", cue)
-                                          : fmt::format("{} is not a number", cue);
+      return reason == MissReason::kScore
+                 ? fmt::format("unlike the trained poses (most at {})", cue)
+                 : fmt::format("{} is not a number, or far beyond anything that training had", cue);
     }
   }
   return "";

@@ -33,7 +33,7 @@ enum class EstimatorMode : std::uint8_t { kMap, kPaper };
 enum class MissReason : std::uint8_t {
   kNone,        // a hit
   kScore,       // the score is above tau_lo; `offender` is the cue of the largest leave-one-out error
-  kNotFinite,   // a measurement is NaN or infinite; `offender` is its cue
+  kNotFinite,   // a measurement is NaN, infinite or huge; `offender` is its cue
   kOutOfRange,  // a value is outside its trained range; `offender` is its guard
   kNeverHit,    // the tolerance is zero, or no threshold keeps the violation rate
   kDoubt,       // what a tile's products say is above tau_lo; `offender` is the tile (kpsa/subspace.h)
