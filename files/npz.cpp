@@ -15,6 +15,7 @@
 
 #include "base/check.h"
 #include "files/file.h"
+#include "files/temporaries.h"
 
 namespace kpsa::engine {
 namespace {
@@ -124,11 +125,14 @@ Result<NpzWriter::ArrayId> NpzWriter::Declare(const std::string& name, NpzType t
   array.expected = *size;
   if (*size > kSpoolAbove) {
     const std::string spool = fmt::format("{}.{}", impl_->output.temporary_path(), impl_->arrays.size());
+    AddTemporary(spool);  // a signal may come before its name goes
     array.spool.reset(std::fopen(spool.c_str(), "w+bx"));
+    const int reason = errno;
+    if (array.spool != nullptr) ::unlink(spool.c_str());
+    DropTemporary(spool);
     if (array.spool == nullptr) {
-      return Status::Invalid("cannot be written: {}", std::generic_category().message(errno)).At({path});
+      return Status::Invalid("cannot be written: {}", std::generic_category().message(reason)).At({path});
     }
-    ::unlink(spool.c_str());
   }
   const std::string header = NpyHeader(type, shape);
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(header.data());

@@ -132,8 +132,14 @@ TEST_F(Places, AJointOfTheChainIsGuardedWherePointsStayBehind) {
   const HelloFolder folder;
   folder.Edit("  upper.rotateX: {min: -30, max: 30}\n", "");
   folder.Edit("subspace: hello.kpsa", "space: upper, subspace: hello.kpsa");
+  // "wave" turns upper about an axis that was never trained: it comes to the character after training
+  const std::string glb = HelloFolder::Glb();
+  GlbParts before(glb);
+  before.json.erase("animations");
+  folder.Write("hello.glb", before.Bytes());
+  folder.Edit(", test: {clips: [wave]}", "");
   Run(folder, {"train", "hello.yaml", "--force", "-q"});
-  // "wave" turns upper about an axis that was never trained
+  folder.Write("hello.glb", glb);
   const Told told = Compare(folder, "hello.yaml", {"--clip", "wave"});
   EXPECT_GT(told.frames, told.hits);
   EXPECT_LE(told.worst, 2 * kTolerance);
