@@ -107,7 +107,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
 
   // What the rig is for
   AddControls(in, &rig->controls);
-  AddAccelerateEntries(in, scene, &rig->accelerate);
+  AddAccelerateEntries(in, scene, &rig->accelerate, &rig->notes);
 }
 
 }  // namespace kpsa::engine

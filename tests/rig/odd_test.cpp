@@ -321,6 +321,20 @@ accelerate:
   EXPECT_EQ(rig.graph->PlugName(rig.accelerate[0].points[0].points), "m@1.outPoints[0]");
   EXPECT_EQ(rig.graph->PlugName(rig.accelerate[1].points[0].points), "twin_skinCluster.outPoints[0]");
   EXPECT_DOUBLE_EQ(rig.accelerate[1].violation_rate, 0.005);
+  EXPECT_TRUE(rig.notes.empty()) << rig.notes.front();
+}
+
+TEST_F(OddRigs, AccelerationsOfOneFileAreNoted) {
+  Plain();
+  const Rig rig = Sound(R"(controls: {tip.rotateX: {min: -10, max: 10}}
+accelerate:
+  one: {points: body@gltf, subspace: one.kpsa}
+  two: {points: twin@gltf, subspace: ./one.kpsa}
+)",
+                        1);
+  ASSERT_EQ(rig.notes.size(), 1u);
+  EXPECT_NE(rig.notes[0].find("accelerate \"one\" and \"two\" have one subspace file"), std::string::npos)
+      << rig.notes[0];
 }
 
 TEST_F(OddRigs, AnchorsRepeatANode) {

@@ -1,12 +1,15 @@
 #include "rig/build/steps/add_accelerate_entries.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <map>
 
 namespace kpsa::engine {
 
-void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene,
-                          std::vector<AccelerateEntry>* entries) {
+void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene, std::vector<AccelerateEntry>* entries,
+                          std::vector<std::string>* notes) {
   std::vector<std::string> clips;
   for (const CharacterClip& clip : in.rig.scene.clips) clips.push_back(clip.id);
   const auto read_clips = [&](const std::vector<RigString>& names, std::vector<std::string>* to) {
@@ -24,11 +27,21 @@ void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene,
       if (!points.colors) by_mesh.emplace(points.mesh, entry.where);
     }
   }
+  std::map<std::string, std::string>
+      by_file;  // entries of this rig: two heroes of one reference share theirs
   for (const RigAccelerateEntry& from : in.file.accelerate) {
     AccelerateEntry to;
     to.name = from.name;
     to.where = from.where;
     to.subspace = from.subspace;
+    if (const auto [it, added] =
+            by_file.emplace(std::filesystem::path(to.subspace).lexically_normal().string(), from.name);
+        !added && !to.subspace.empty()) {
+      notes->push_back(fmt::format(
+          "{}: accelerate \"{}\" and \"{}\" have one subspace file: to train one overwrites the other; "
+          "give each its own",
+          from.where.ToString(), it->second, from.name));
+    }
     to.tolerance = from.tolerance.value_or(from.colors.empty() ? in.rig.rest_diagonal / 2000 : 0.05);
     to.violation_rate = from.violation_rate;
     to.train_samples = from.train_samples;
