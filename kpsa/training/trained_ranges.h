@@ -19,7 +19,7 @@ class RangeFinder {
   void Widen(std::span<const float> scalars);  // of one pose, all of them
   void Widen(const RangeFinder& others);
   void Widen(Index first, std::span<const float> scalars);  // some of them, which have ranges
-  void Plays(const PoseMatrix& poses);  // they are posed as such: played() has them
+  void Plays(const PoseMatrix& poses);                      // they are posed as such: played() has them
   // By the clips between their times: quaternion keys turn joints about axes there that no frame has.
   Status Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder);
   bool Moves(Index first, std::size_t count) const;  // one of these scalars, by more than float noise
