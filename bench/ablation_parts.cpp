@@ -65,7 +65,7 @@ class PartsBench {
       return of_options > 0 ? of_options : static_cast<std::size_t>(of_rig);
     };
     TrainOptions options;
-    options.samples = given(options_.samples, entry.train_samples);
+    options.samples = given(options_.samples, entry.train_samples.value_or(0));
     options.calibration_poses = given(options_.calibration_poses, entry.calibration_poses);
     options.key_points = options_.key_points;
     options.tolerance = entry.tolerance;

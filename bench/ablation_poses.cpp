@@ -32,7 +32,7 @@ Status AblationPoses::Load(const std::string& path, std::size_t samples) {
   if (rig.accelerate.empty() || rig.accelerate[0].test_clips.empty())
     return Status::Invalid("expected an accelerate entry with a test clip").At({path});
   entry = rig.accelerate[0];
-  if (samples == 0) samples = static_cast<std::size_t>(entry.train_samples);
+  if (samples == 0) samples = TrainOptionsOf(rig, entry).samples;
   training_rig_ = MakeTrainingRig(&rig, entry);
   Result<std::vector<TrainingClip>> clips = ClipFrames(rig, entry.train_clips),
                                     tests = ClipFrames(rig, {entry.test_clips[0]});

@@ -20,8 +20,8 @@ namespace kpsa::engine {
 namespace {
 
 // What training takes of an accelerate entry (cli/cmd_train.cpp does the same).
-TrainOptions OptionsOf(const AccelerateEntry& entry, double tolerance, std::uint64_t seed) {
-  TrainOptions options = TrainOptionsOf(entry);
+TrainOptions OptionsOf(const Rig& rig, const AccelerateEntry& entry, double tolerance, std::uint64_t seed) {
+  TrainOptions options = TrainOptionsOf(rig, entry);
   options.tolerance = tolerance;
   options.seed = seed;
   options.progress = [](const char*, double) { return !Interrupted(); };
@@ -200,7 +200,7 @@ Status PromiseRig::PrepareSampler() {
   Result<ClipPoses> clip_poses = recorder.ControlsOfClips(trained);
   if (!clip_poses.ok()) return clip_poses.status();
   clip_poses_ = std::move(*clip_poses);
-  if (entry_.train_samples > 0 && !controls().empty()) {
+  if (TrainOptionsOf(open_->rig, entry_).samples > 0 && !controls().empty()) {
     PoseMatrix sweeps(*layout);
     KPSA_RETURN_IF_ERROR(recorder.AddSamples(Sweeps(controls()), trained, &sweeps));
     groups_ = FindControlGroups(sweeps, 0, controls().size());
@@ -226,7 +226,8 @@ Result<std::vector<PromisePose>> PromiseRig::Sample(std::size_t count, std::uint
 Result<PromiseTraining> PromiseRig::Train(double tolerance, std::uint64_t seed) {
   const std::vector<TrainingClip> trained(clips_.begin(),
                                           clips_.begin() + static_cast<std::ptrdiff_t>(trained_clips_));
-  Result<Subspace> subspace = kpsa::engine::Train(training_rig_, trained, OptionsOf(entry_, tolerance, seed));
+  Result<Subspace> subspace =
+      kpsa::engine::Train(training_rig_, trained, OptionsOf(open_->rig, entry_, tolerance, seed));
   if (!subspace.ok()) return Status(subspace.status()).At({path_});
   PromiseTraining training;
   training.subspace_ = std::make_shared<const Subspace>(std::move(*subspace));

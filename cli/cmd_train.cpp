@@ -98,7 +98,7 @@ CommandResult RunTrain(const TrainFlags& flags) {
   if (path.empty())
     return Status::Usage("accelerate: \"{}\" names no subspace file: expected -o FILE.kpsa", entry->name);
   KPSA_RETURN_IF_ERROR(CheckOutput(path, flags.force, {".kpsa"}));
-  options = TrainOptionsOf(*entry);
+  options = TrainOptionsOf(rig, *entry);
   KPSA_RETURN_IF_ERROR(ReadOptions(flags, &options));  // which were looked at before the rig was loaded
   if (flags.clips.has_value()) {
     for (const std::string& clip : SplitNames(*flags.clips)) {

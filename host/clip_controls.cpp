@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/scalar_math.h"
+#include "rig/build/control_plugs.h"
 #include "rig/build/starter_character.h"
 
 namespace kpsa::engine {
@@ -28,7 +29,7 @@ class ClipControls {
     const auto add = [&](const char* attribute, int axis, const MotionRange& range, double least,
                          double unit) {
       const PlugRef plug{node, def.FindAttribute(attribute), -1, axis};
-      const double rest = RestOf(plug);
+      const double rest = RestValueOf(graph_, plug);
       if (range.size() >= least) Add(plug, rest, rest + range.min * unit, rest + range.max * unit);
     };
     for (int axis = 0; axis < 3; ++axis) {
@@ -42,35 +43,20 @@ class ClipControls {
     for (std::size_t k = 0; k < weights.size(); ++k) {
       const PlugRef plug{node, attribute, static_cast<int>(k), -1};
       if (weights[k].size() >= kLeastWeight && IsClipPlug(rig_.scene, graph_, plug))
-        Add(plug, RestOf(plug), weights[k].min, weights[k].max);
+        Add(plug, RestValueOf(graph_, plug), weights[k].min, weights[k].max);
     }
   }
 
   std::vector<ControlRange> Take() { return std::move(controls_); }
 
  private:
-  double RestOf(const PlugRef& plug) const {
-    const Value* set = graph_.FindValue(plug);
-    if (set != nullptr) return set->AsDouble();
-    PlugRef whole = plug;
-    whole.component = -1;
-    set = graph_.FindValue(whole);
-    const Value& base =
-        set != nullptr
-            ? *set
-            : graph_.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].default_value;
-    const Double3* triple = base.get_if<Double3>();
-    return triple != nullptr && plug.component >= 0 ? (*triple)[plug.component] : base.AsDouble();
-  }
   void Add(const PlugRef& plug, double rest, double min, double max) {
     PlugRef whole = plug;
     whole.component = -1;
-    for (const PlugRef& driven : {plug, whole}) {
-      if (std::ranges::find(rig_.pinned, driven) != rig_.pinned.end()) return;
-      const Connection* driver = graph_.FindConnection(driven);
-      const std::vector<NodeId>& clip_nodes = rig_.scene.clip_nodes;
-      if (driver != nullptr && std::ranges::find(clip_nodes, driver->source.node) == clip_nodes.end()) return;
-    }
+    const auto pinned = [&](const PlugRef& at) {
+      return std::ranges::find(rig_.pinned, at) != rig_.pinned.end();
+    };
+    if (pinned(plug) || pinned(whole) || DriverBesidesClips(rig_.scene, graph_, plug) != nullptr) return;
     if (std::ranges::find(rig_.controls, plug, &Control::plug) != rig_.controls.end()) return;
     ControlRange& control = controls_.emplace_back();
     control.plug = plug;

@@ -27,7 +27,7 @@ Result<LearnerRig> OpenForLearner(const RigOpener& opener, const std::optional<s
     if (!clips.ok()) return clips.status();
     return std::move(clips->front());
   };
-  rig.samples = static_cast<std::size_t>(std::max<std::int64_t>(0, entry->train_samples));
+  rig.samples = TrainOptionsOf(open->rig, *entry).samples;
   return rig;
 }
 

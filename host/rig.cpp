@@ -38,8 +38,9 @@ MeshInfo InfoOf(const engine::CharacterMesh& mesh, const engine::Graph& graph) {
 }
 
 // The options over those of the rig's entry.
-engine::TrainOptions TrainOptionsOf(const TrainingOptions& options, const engine::AccelerateEntry& entry) {
-  engine::TrainOptions train = engine::TrainOptionsOf(entry);
+engine::TrainOptions TrainOptionsOf(const TrainingOptions& options, const engine::Rig& rig,
+                                    const engine::AccelerateEntry& entry) {
+  engine::TrainOptions train = engine::TrainOptionsOf(rig, entry);
   if (options.paper) train.mode = engine::EstimatorMode::kPaper;
   if (options.samples.has_value()) train.samples = *options.samples;
   if (options.calibration.has_value()) train.calibration_poses = *options.calibration;
@@ -182,7 +183,7 @@ kpsa::Result<TrainingReport> Rig::Train(const TrainingOptions& options, const st
   if (const auto output = engine::OutputFile::Create(path, true); !output.ok())
     return failed(output.status());
   const engine::ThreadLimit limit(options.threads);
-  const engine::TrainOptions train = TrainOptionsOf(options, *entry);
+  const engine::TrainOptions train = TrainOptionsOf(options, rig, *entry);
   const engine::Result<engine::Subspace> trained = engine::Train(training, *clips, train);
   if (!trained.ok()) return failed(engine::Status(trained.status()).At({rig.path}));
   if (const engine::Status written = engine::WriteSubspace(*trained, path); !written.ok())

@@ -5,6 +5,7 @@
 
 #include "host/clip_controls.h"
 #include "host/rig_frames.h"
+#include "rig/build/starter_training.h"
 
 namespace kpsa::engine {
 
@@ -145,9 +146,25 @@ TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry) {
   return training;
 }
 
-TrainOptions TrainOptionsOf(const AccelerateEntry& entry) {
+namespace {
+
+std::size_t ChosenSamples(const Rig& rig, const AccelerateEntry& entry) {
+  const bool light = std::ranges::any_of(entry.points, &AcceleratedPoints::colors);
+  const std::size_t controls = rig.controls.size() + ControlsOfClips(rig).size();
+  if (light || controls == 0) return 0;
+  std::size_t frames = 0;
+  if (const auto clips = ClipFrames(rig, entry.train_clips); clips.ok()) {
+    for (const TrainingClip& clip : *clips) frames += clip.times.size();
+  }
+  return static_cast<std::size_t>(StarterSamples(controls, static_cast<std::int64_t>(frames)));
+}
+
+}  // namespace
+
+TrainOptions TrainOptionsOf(const Rig& rig, const AccelerateEntry& entry) {
   TrainOptions options;
-  options.samples = static_cast<std::size_t>(entry.train_samples);
+  options.samples = entry.train_samples.has_value() ? static_cast<std::size_t>(*entry.train_samples)
+                                                    : ChosenSamples(rig, entry);
   options.calibration_poses = static_cast<std::size_t>(entry.calibration_poses);
   if (entry.key_points > 0)
     options.key_points = options.min_points = static_cast<std::size_t>(entry.key_points);

@@ -14,8 +14,9 @@ namespace kpsa::engine {
 AccelerationTarget MakeTarget(const Rig& rig, const AccelerateEntry& entry);
 // Refers to the rig, which must outlive it.
 TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry);
-// What the entry asks for; the rest is the trainer's own.
-TrainOptions TrainOptionsOf(const AccelerateEntry& entry);
+// What the entry asks for; the rest is the trainer's own. Where it says nothing of samples, as many as kpsa init would write
+// for all that training poses (of light, which takes seconds a pose, none).
+TrainOptions TrainOptionsOf(const Rig& rig, const AccelerateEntry& entry);
 // Every frame of the clips, as ClipTimes counts them (host/rig_frames.h). Errors: a clip that the character lacks.
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
 // Of all entries of the rig, each once.

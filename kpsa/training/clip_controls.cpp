@@ -7,11 +7,6 @@
 
 namespace kpsa::engine {
 
-std::size_t SamplesFor(std::size_t controls) {
-  return controls == 0 ? 0
-                       : std::clamp<std::size_t>(300 + 10 * controls, 400, 2000);  // as kpsa init has them
-}
-
 Result<TrainingRig> WithClipControls(const TrainingRig& rig, const std::vector<TrainingClip>& clips) {
   TrainingRig with = rig;
   if (rig.by_clips.empty()) return with;

@@ -2,15 +2,11 @@
 // what they move together (two brows that are always alike). It is posed as the controls are. Internal to training.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "kpsa/training/trainer.h"
 
 namespace kpsa::engine {
-
-// Samples for so many controls, where nobody says how many; 0 for none.
-std::size_t SamplesFor(std::size_t controls);
 
 // The rig with those of TrainingRig::by_clips among its controls that the points depend on. No clip plays after.
 Result<TrainingRig> WithClipControls(const TrainingRig& rig, const std::vector<TrainingClip>& clips);

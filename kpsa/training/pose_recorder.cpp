@@ -351,13 +351,14 @@ Status PoseRecorder::VisitSignals(const std::vector<SampledPose>& poses,
   KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
   const auto plan = PlanOfSignals(rig_.Varying(false));
   if (!plan.ok()) return plan.status();
+  const std::vector<std::size_t> used = rig_.FreeControls(false);
+  std::vector<Index> numbers;
+  for (const std::size_t c : used) numbers.push_back((*plan)->FindVarying(rig_.controls[c].plug));
   Evaluator evaluator(*plan);
   std::vector<float> entries(layout_.scalars);
   for (const SampledPose& pose : poses) {
-    for (const std::size_t c : rig_.FreeControls(false)) {
-      const PlugRef& plug = rig_.controls[c].plug;
-      SetControl(plug, (*plan)->FindVarying(plug), pose.values[c], &evaluator);
-    }
+    for (std::size_t k = 0; k < used.size(); ++k)
+      SetControl(rig_.controls[used[k]].plug, numbers[k], pose.values[used[k]], &evaluator);
     KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
     StoreSignals(evaluator, SpaceFromWorld(evaluator), 0, entries);
     visit(entries);

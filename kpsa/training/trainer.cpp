@@ -355,9 +355,6 @@ Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& 
   try {
     const Result<TrainingRig> all = WithClipControls(rig, clips);
     if (!all.ok()) return all.status();
-    // A rig without controls can ask for no samples
-    if (rig.controls.empty() && watched.samples == 0 && !rig.target.colors)
-      watched.samples = SamplesFor(all->controls.size());
     Result<Subspace> trained = Finish(TrainFollowing(*all, clips, watched));
     if (!trained.ok() && cancel.asked()) throw Cancelled();  // an evaluation that was ended, say
     if (!trained.ok() || !watched.by_tile_as_before || trained->by_tile()) return trained;

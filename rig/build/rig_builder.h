@@ -56,9 +56,9 @@ struct AccelerateEntry {
                                 // of colours in their units, 0.05 where the rig names none
   double violation_rate = 0.01;
   std::vector<std::string> train_clips, test_clips;
-  std::int64_t train_samples = 0;
-  std::int64_t key_points = 0;         // that are measured, at least; 0: the trainer's number
-  std::int64_t calibration_poses = 0;  // of each kind; 0: the trainer's number
+  std::optional<std::int64_t> train_samples;  // unset: TrainOptionsOf (host/rig_training.h) chooses
+  std::int64_t key_points = 0;                // that are measured, at least; 0: the trainer's number
+  std::int64_t calibration_poses = 0;         // of each kind; 0: the trainer's number
   SourceLocation where;
   int reference = -1;  // in Rig::references: whose entry it is; -1: of the rig's own files
 };

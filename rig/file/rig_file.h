@@ -84,7 +84,7 @@ struct RigAccelerateEntry {
   std::optional<double> tolerance;  // metres; of colours in their units
   double violation_rate = 0.01;     // of frames, 0..1
   std::vector<RigString> train_clips, test_clips;
-  std::int64_t train_samples = 0;
+  std::optional<std::int64_t> train_samples;           // unset: the program chooses
   std::int64_t key_points = 0, calibration_poses = 0;  // 0: the trainer's
 };
 

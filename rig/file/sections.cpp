@@ -234,8 +234,10 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
       YamlMap train_map(*train, "train", errors);
       if (const YamlNode* clips = train_map.Find("clips"))
         ReadNames(*clips, "clips", &accelerate.train_clips);
-      if (const YamlNode* samples = train_map.Find("samples"))
-        ReadInteger(*samples, "samples", 0, kMaxSamples, &accelerate.train_samples, errors);
+      std::int64_t count = 0;
+      if (const YamlNode* samples = train_map.Find("samples");
+          samples != nullptr && ReadInteger(*samples, "samples", 0, kMaxSamples, &count, errors))
+        accelerate.train_samples = count;
       if (const YamlNode* points = train_map.Find("keyPoints"))
         ReadInteger(*points, "keyPoints", 1, kMaxKeyPoints, &accelerate.key_points, errors);
       if (const YamlNode* poses = train_map.Find("heldOut"))

@@ -3,6 +3,7 @@
 
 #include "base/scalar_math.h"
 #include "host/rig_training.h"
+#include "rig/build/starter_training.h"
 #include "tests/cli/rig_run.h"
 #include "tests/support/moving_character.h"
 #include "tests/support/temporary_folder.h"
@@ -46,18 +47,20 @@ MovingCharacter Talker() {
   return character;
 }
 
-constexpr const char* kTalkerRig = R"(kpsa: 1
-character: m.gltf
-controls: {root.rotateZ: {min: -3deg, max: 3deg}}
-accelerate: {strip: {points: [strip@skin], subspace: m.kpsa, tolerance: 2mm, train: {clips: [talk], samples: 400}}}
-)";
+std::string TalkerRig(const std::string& controls, const std::string& samples) {
+  return controls +
+         "accelerate: {strip: {points: [strip@skin], subspace: m.kpsa, tolerance: 2mm, train: {clips: "
+         "[talk]" +
+         samples + "}}}\n";
+}
+constexpr const char* kTalkerControls = "controls: {root.rotateZ: {min: -3deg, max: 3deg}}\n";
+const std::string kTalkerRig = TalkerRig(kTalkerControls, ", samples: 400");
 
 class ClipControls : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_.Write("m.gltf", Talker().builder.Text());
-    path_ = folder_.Write("m.yaml", kTalkerRig);
-    Result<Rig> rig = LoadRig(AcceleratedRegistry(), path_, {});
+    path_ = folder_ / "m.yaml";
+    Result<Rig> rig = LoadRigOf(folder_, Talker().builder.Text(), kTalkerRig);
     ASSERT_TRUE(rig.ok()) << rig.status().ToString();
     rig_ = std::make_unique<Rig>(std::move(*rig));
     training_ = MakeTrainingRig(rig_.get(), rig_->accelerate.at(0));
@@ -124,14 +127,29 @@ TEST_F(ClipControls, AreOnlyWhatThePointsDependOn) {
   character.builder.root["scenes"][0]["nodes"].push_back(
       character.builder.Push("nodes", {{"name", "prop"}, {"translation", {0, 0, 2}}}));
   character.Swing("talk", 20, 2, 3);
-  folder_.Write("m.gltf", character.builder.Text());
-  Result<Rig> rig = LoadRig(AcceleratedRegistry(), path_, {});
+  Result<Rig> rig = LoadRigOf(folder_, character.builder.Text(), kTalkerRig);
   ASSERT_TRUE(rig.ok()) << rig.status().ToString();
   const TrainingRig training = MakeTrainingRig(&*rig, rig->accelerate.at(0));
   EXPECT_EQ(training.by_clips.size(), training_.by_clips.size() + 1);
   const Result<TrainingRig> with = WithClipControls(training, clips_);
   ASSERT_TRUE(with.ok()) << with.status().ToString();
   EXPECT_EQ(with->controls.size(), training.controls.size() + training_.by_clips.size());
+}
+
+// Where the rig says nothing, and no more than a number that it says.
+TEST_F(ClipControls, AreSampledAsInitWould) {
+  const auto samples = [&](const std::string& yaml) -> std::size_t {
+    const Result<Rig> rig = LoadRigOf(folder_, Talker().builder.Text(), yaml);
+    EXPECT_TRUE(rig.ok()) << rig.status().ToString();
+    return rig.ok() ? TrainOptionsOf(*rig, rig->accelerate.at(0)).samples : 0;
+  };
+  const auto as_init = [](std::size_t controls) {
+    return static_cast<std::size_t>(StarterSamples(controls, kTalkFrames));
+  };
+  EXPECT_EQ(samples(TalkerRig(kTalkerControls, "")), as_init(1 + 5));
+  EXPECT_EQ(samples(TalkerRig("", "")), as_init(5)) << "a rig without controls";
+  EXPECT_EQ(samples(TalkerRig(kTalkerControls, ", samples: 0")), 0u);
+  EXPECT_EQ(samples(TalkerRig(kTalkerControls, ", samples: 70")), 70u);
 }
 
 // Known as talk moves them alone, they were wrong and hit in another clip that parts them.

@@ -18,6 +18,11 @@ const NodeRegistry& AcceleratedRegistry() {
   return *registry;
 }
 
+Result<Rig> LoadRigOf(const TemporaryFolder& folder, const std::string& gltf, const std::string& yaml) {
+  folder.Write("m.gltf", gltf);
+  return LoadRig(AcceleratedRegistry(), folder.Write("m.yaml", "kpsa: 1\ncharacter: m.gltf\n" + yaml), {});
+}
+
 std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOptions& options,
                                          const std::vector<std::string>& clips) {
   RigOptions rest;

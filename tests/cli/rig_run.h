@@ -14,6 +14,7 @@
 #include "graph/evaluator.h"
 #include "host/rig_training.h"
 #include "kpsa/accelerate.h"
+#include "tests/support/temporary_folder.h"
 
 namespace kpsa::engine {
 
@@ -21,6 +22,9 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // All node types and the KPSA node.
 const NodeRegistry& AcceleratedRegistry();
+
+// A rig of m.gltf, both written into the folder, m.yaml by what follows "character: m.gltf".
+Result<Rig> LoadRigOf(const TemporaryFolder& folder, const std::string& gltf, const std::string& yaml);
 
 // Trains the first entry of the rig's accelerate section. Fails the test and gives null where that does not
 // work.

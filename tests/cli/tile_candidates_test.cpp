@@ -117,16 +117,12 @@ std::vector<std::string> RelativeMatricesUnder(const char* name, int base) {
   root["skins"][0]["inverseBindMatrices"] = character.builder.Accessor(bind, "MAT4");
   character.Swing("talk", 40, 2);
   TemporaryFolder folder;
-  folder.Write("m.gltf", character.builder.Text());
-  Result<Rig> rig = LoadRig(AcceleratedRegistry(), folder.Write("m.yaml", R"(kpsa: 1
-character: m.gltf
-controls:
+  Result<Rig> rig = LoadRigOf(folder, character.builder.Text(), R"(controls:
   root.rotateZ: {min: -3deg, max: 3deg}
   tip.rotateZ: {min: -30deg, max: 30deg}
 accelerate:
   strip: {points: [strip@skin], space: root, subspace: m.kpsa, tolerance: 1mm, train: {clips: [talk], samples: 60}}
-)"),
-                            {});
+)");
   EXPECT_TRUE(rig.ok()) << name << ": " << rig.status().ToString();
   if (!rig.ok()) return {};
   const std::vector<TrainingClip> clips{{"talk", {0, 0.5, 1, 1.5}}};
@@ -157,13 +153,10 @@ TEST(TileCandidates, WhatClipsAloneMoveIsNamed) {
   character.Swing("talk", 40, 2);
   character.Swing("talk", 20, 2, 1);
   TemporaryFolder folder;
-  folder.Write("m.gltf", character.builder.Text());
-  Result<Rig> rig = LoadRig(AcceleratedRegistry(), folder.Write("m.yaml", R"(kpsa: 1
-character: m.gltf
-controls: {root.rotateZ: {min: -3deg, max: 3deg}}
+  Result<Rig> rig =
+      LoadRigOf(folder, character.builder.Text(), R"(controls: {root.rotateZ: {min: -3deg, max: 3deg}}
 accelerate: {strip: {points: [strip@skin], subspace: m.kpsa, tolerance: 1mm, train: {clips: [talk], samples: 60}}}
-)"),
-                            {});
+)");
   ASSERT_TRUE(rig.ok()) << rig.status().ToString();
   Compiler compiler;
   const TrainingRig training = MakeTrainingRig(&*rig, rig->accelerate.at(0));

@@ -27,8 +27,8 @@ void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene, std::vect
       if (!points.colors) by_mesh.emplace(points.mesh, entry.where);
     }
   }
-  std::map<std::string, std::string>
-      by_file;  // entries of this rig: two heroes of one reference share theirs
+  // Of this rig alone: two heroes of one reference share theirs
+  std::map<std::string, std::string> by_file;
   for (const RigAccelerateEntry& from : in.file.accelerate) {
     AccelerateEntry to;
     to.name = from.name;
@@ -82,7 +82,7 @@ void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene, std::vect
       }
       to.points.push_back({0, 0, *plug, true});
     }
-    if (to.train_samples > 0 && in.rig.controls.empty()) {
+    if (to.train_samples.value_or(0) > 0 && in.rig.controls.empty()) {
       in.Fail(from.where,
               Status::Invalid(
                   "accelerate \"{}\": train.samples draws poses from the controls, and the rig declares none",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "rig/build/control_plugs.h"
 #include "rig/build/plug_keys.h"
 
 namespace kpsa::engine {
@@ -40,14 +41,8 @@ void AddControls(const BuildInput& in, std::vector<Control>* controls) {
       refuse(Status::Invalid("\"{}\" and \"{}\" are the same control", from.plug.text, it->second));
       continue;
     }
-    PlugRef whole = *plug;
-    whole.component = -1;
     const bool by_clip = IsClipPlug(in.rig.scene, in.graph(), *plug);
-    const Connection* driver = in.graph().FindConnection(*plug);
-    if (driver == nullptr) driver = in.graph().FindConnection(whole);
-    const std::vector<NodeId>& clip_nodes = in.rig.scene.clip_nodes;
-    if (driver != nullptr &&
-        std::find(clip_nodes.begin(), clip_nodes.end(), driver->source.node) == clip_nodes.end()) {
+    if (const Connection* driver = DriverBesidesClips(in.rig.scene, in.graph(), *plug)) {
       refuse(Status::Invalid("{} is driven by {} and cannot be a control", name,
                              in.graph().PlugName(driver->source)));
       continue;
@@ -74,15 +69,7 @@ void AddControls(const BuildInput& in, std::vector<Control>* controls) {
                      attribute.max);
       continue;
     }
-    if (const Value* value = in.graph().FindValue(*plug)) {
-      control.value = value->AsDouble();
-    } else {
-      const Value* set = in.graph().FindValue(whole);
-      const Value& base = set != nullptr ? *set : attribute.default_value;
-      const Double3* triple = base.get_if<Double3>();
-      control.value =
-          triple != nullptr && plug->component >= 0 ? (*triple)[plug->component] : base.AsDouble();
-    }
+    control.value = RestValueOf(in.graph(), *plug);
     controls->push_back(std::move(control));
   }
 }
